@@ -85,10 +85,6 @@ class SolidBuilder {
     const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.1 * size_);
     const Eigen::AlignedBox2d wide(box.min() - margin, box.max() + margin);
     std::vector<Line2> lines;
-    const std::vector<Eigen::Vector2d>& footprint = building_.footprint;
-    for (size_t i = 0; i < footprint.size(); ++i) {
-      lines.push_back(Line2::Through(footprint[i], footprint[(i + 1) % footprint.size()]));
-    }
     for (const auto& [i, j] : MeetingPlanes(building_.roof, wide)) {
       const RoofPlane &a = building_.roof[i], &b = building_.roof[j];
       const Eigen::Vector2d gradient = a.Gradient() - b.Gradient();
@@ -99,23 +95,18 @@ class SolidBuilder {
                     (b.HeightAt(box.min()) - a.HeightAt(box.min())) / gradient.norm();
       lines.push_back(line);
     }
-    cells_ = ArrangeCells(wide, lines, epsilon_);
+    cells_ = ArrangeInside(building_.footprint, lines, epsilon_);
     for (size_t cell = 0; cell < cells_.cells.size(); ++cell) {
       const Eigen::Vector2d centre = cells_.CentreOf(static_cast<int>(cell));
-      int label = -1;
-      if (IsInside(footprint, centre)) {
-        label = 0;
-        for (size_t k = 1; k < building_.roof.size(); ++k) {
-          if (building_.roof[k].HeightAt(centre) < building_.roof[label].HeightAt(centre)) {
-            label = static_cast<int>(k);
-          }
+      int label = 0;
+      for (size_t k = 1; k < building_.roof.size(); ++k) {
+        if (building_.roof[k].HeightAt(centre) < building_.roof[label].HeightAt(centre)) {
+          label = static_cast<int>(k);
         }
       }
       labels_.push_back(label);
     }
-    std::vector<int> covered = labels_;
-    for (int& label : covered) label = std::min(label, 0);
-    outline_ = OutlinesOf(cells_, covered, 0);
+    outline_ = OutlinesOf(cells_, std::vector<int>(labels_.size(), 0), 0);
     for (size_t k = 0; k < building_.roof.size(); ++k) {
       patches_.push_back(OutlinesOf(cells_, labels_, static_cast<int>(k)));
     }
@@ -200,7 +191,7 @@ class SolidBuilder {
   const OutlineBuilding& building_;
   double size_ = 0, epsilon_ = 0;
   CellArrangement cells_;
-  std::vector<int> labels_;  // the lowest roof plane of each cell, -1 = outside
+  std::vector<int> labels_;  // the lowest roof plane of each cell
   std::vector<Loop> outline_;
   std::vector<std::vector<Loop>> patches_;  // of each roof plane
   std::set<int> corners_, needed_;          // of the footprint; of any face
@@ -265,6 +256,7 @@ std::vector<Triangle> TrianglesOf(const BuildingSolid& solid, const SolidFace& f
       const double longest =
           std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
       if (!(area > 1e-12 * longest)) continue;
+      if (area / longest <= best_quality) continue;
       const bool blocked = std::any_of(left.begin(), left.end(), [&](size_t other) {
         if (other == ia || other == ib || other == ic) return false;
         const Eigen::Vector2d& p = flat[other];
@@ -272,7 +264,7 @@ std::vector<Triangle> TrianglesOf(const BuildingSolid& solid, const SolidFace& f
         return TwiceArea(a, b, p) >= slack && TwiceArea(b, c, p) >= slack &&
                TwiceArea(c, a, p) >= slack;
       });
-      if (blocked || area / longest <= best_quality) continue;
+      if (blocked) continue;
       best_quality = area / longest;
       best = i;
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "core/frames.h"
@@ -16,7 +17,11 @@ class CellCutter {
  public:
   explicit CellCutter(CellArrangement* arrangement) : a_(*arrangement) {}
 
-  void Cut(const Line2& line, int id, double epsilon) {
+  // Whole cells, those that the line passes between `from` and `to`, lengths along its direction.
+  void Cut(const Line2& line, int id, double epsilon,
+           double from = -std::numeric_limits<double>::infinity(),
+           double to = std::numeric_limits<double>::infinity()) {
+    const bool is_whole = std::isinf(from) && std::isinf(to);
     distances_.clear();
     for (const Eigen::Vector2d& x : a_.vertices) {
       const double d = line.SignedDistance(x);
@@ -26,7 +31,9 @@ class CellCutter {
     const size_t num_cells = a_.cells.size();
     for (size_t i = 0; i < num_cells; ++i) {
       std::vector<int> left, right;
-      Split(a_.cells[i], &left, &right);
+      if (is_whole || Passes(line, a_.cells[i], from - epsilon, to + epsilon)) {
+        Split(a_.cells[i], &left, &right);
+      }
       if (left.size() < 3 || right.size() < 3) {
         NameEdges(a_.cells[i], id);
         continue;
@@ -35,9 +42,43 @@ class CellCutter {
       a_.cells[i] = left;
       a_.cells.push_back(right);
     }
+    if (!is_whole) AddCorners();
   }
 
  private:
+  // The line meets the cell between `from` and `to`. Where it only touches it there, to cut it as
+  // well does no harm.
+  bool Passes(const Line2& line, const std::vector<int>& cell, double from, double to) const {
+    const Eigen::Vector2d along = line.Direction();
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (size_t k = 0; k < cell.size(); ++k) {
+      const int v = cell[k], next = cell[(k + 1) % cell.size()];
+      const double d = distances_[v], d_next = distances_[next];
+      if (d != 0 && d * d_next >= 0) continue;
+      const Eigen::Vector2d& a = a_.vertices[v];
+      const double share = d == 0 ? 0 : d / (d - d_next);
+      const double at = along.dot(a + share * (a_.vertices[next] - a));
+      low = std::min(low, at);
+      high = std::max(high, at);
+    }
+    return low < to && high > from;
+  }
+
+  // Cells that were not cut get the corners that the cuts beside them have put on their edges, so
+  // that cells still share whole edges.
+  void AddCorners() {
+    if (crossings_.empty()) return;
+    for (std::vector<int>& cell : a_.cells) {
+      for (size_t k = 0; k < cell.size(); ++k) {
+        const int v = cell[k], next = cell[(k + 1) % cell.size()];
+        if (distances_[v] * distances_[next] >= 0) continue;
+        const auto crossing = crossings_.find(KeyOf(v, next));
+        if (crossing == crossings_.end()) continue;
+        cell.insert(cell.begin() + static_cast<std::ptrdiff_t>(k) + 1, crossing->second);
+      }
+    }
+  }
+
   void Split(const std::vector<int>& cell, std::vector<int>* left, std::vector<int>* right) {
     bool any_left = false, any_right = false;
     for (const int v : cell) {
@@ -109,15 +150,48 @@ double CellArrangement::AreaOf(int cell) const {
   return PolygonArea(polygon);
 }
 
-CellArrangement ArrangeCells(const Eigen::AlignedBox2d& box, const std::vector<Line2>& lines,
-                             double epsilon) {
+namespace {
+
+CellArrangement OneCell(const Eigen::AlignedBox2d& box) {
   CellArrangement arrangement;
   const Eigen::Vector2d low = box.min(), high = box.max();
   arrangement.vertices = {low, {high.x(), low.y()}, high, {low.x(), high.y()}};
   arrangement.cells = {{0, 1, 2, 3}};
   for (int k = 0; k < 4; ++k) arrangement.edge_lines[KeyOf(k, (k + 1) % 4)] = -1;
+  return arrangement;
+}
+
+}  // namespace
+
+CellArrangement ArrangeCells(const Eigen::AlignedBox2d& box, const std::vector<Line2>& lines,
+                             double epsilon) {
+  CellArrangement arrangement = OneCell(box);
   CellCutter cutter(&arrangement);
   for (size_t i = 0; i < lines.size(); ++i) cutter.Cut(lines[i], static_cast<int>(i), epsilon);
+  return arrangement;
+}
+
+CellArrangement ArrangeInside(const std::vector<Eigen::Vector2d>& polygon,
+                              const std::vector<Line2>& lines, double epsilon) {
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& corner : polygon) box.extend(corner);
+  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.1 * box.diagonal().norm());
+  CellArrangement arrangement = OneCell({box.min() - margin, box.max() + margin});
+  CellCutter cutter(&arrangement);
+  int id = 0;
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const Line2 line = Line2::Through(a, b);
+    cutter.Cut(line, id++, epsilon, line.Direction().dot(a), line.Direction().dot(b));
+  }
+  std::vector<std::vector<int>> inside;
+  for (size_t i = 0; i < arrangement.cells.size(); ++i) {
+    if (IsInside(polygon, arrangement.CentreOf(static_cast<int>(i)))) {
+      inside.push_back(arrangement.cells[i]);
+    }
+  }
+  arrangement.cells = std::move(inside);
+  for (const Line2& line : lines) cutter.Cut(line, id++, epsilon);
   return arrangement;
 }
 

@@ -210,7 +210,8 @@ std::vector<std::string> OutlineBuilding::Problems() const {
   return problems;
 }
 
-Outline ParseOutline(const std::string& path, const Json& json) {
+Outline ParseOutline(const std::string& path, const Json& json,
+                     std::vector<std::string>* left_out) {
   const OutlineParser parser(path);
   if (!json.is_object() || !json.contains("format") || json["format"] != kOutlineFormat) {
     parser.Fail("", "is no outline: it lacks \"format\": \"" + std::string(kOutlineFormat) + "\"");
@@ -256,19 +257,26 @@ Outline ParseOutline(const std::string& path, const Json& json) {
   const Json& buildings = parser.List(json, "buildings", "", kMaxBuildings);
   std::set<std::string> names;
   for (size_t i = 0; i < buildings.size(); ++i) {
-    outline.buildings.push_back(ParseBuilding(parser, buildings[i], i));
-    if (!names.insert(outline.buildings.back().name).second) {
-      parser.Fail("building " + std::to_string(i + 1),
-                  "has the name of another one: " + Quoted(outline.buildings.back().name));
+    try {
+      OutlineBuilding building = ParseBuilding(parser, buildings[i], i);
+      if (!names.insert(building.name).second) {
+        parser.Fail("building " + std::to_string(i + 1),
+                    "has the name of another one: " + Quoted(building.name));
+      }
+      outline.buildings.push_back(std::move(building));
+    } catch (const InputError& error) {
+      if (left_out == nullptr) throw;
+      left_out->emplace_back(error.what());
     }
   }
   return outline;
 }
 
-Outline ReadOutline(const std::string& path) {
-  return ParseOutline(path, ReadJson(path,
-                                     "Give the outline.json that roomtex-outline wrote, or mend "
-                                     "what was edited there: a comma, a bracket, a quote"));
+Outline ReadOutline(const std::string& path, std::vector<std::string>* left_out) {
+  const Json json = ReadJson(path,
+                             "Give the outline.json that roomtex-outline wrote, or mend what was "
+                             "edited there: a comma, a bracket, a quote");
+  return ParseOutline(path, json, left_out);
 }
 
 Json OutlineToJson(const Outline& outline) {

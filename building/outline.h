@@ -62,9 +62,11 @@ struct Outline {
 
 // Throws InputError with the place in the file: not JSON, another kind of file, a number that is
 // none, a building that is no solid.
-Outline ReadOutline(const std::string& path);
-// From a JSON text that is named `path` in messages.
-Outline ParseOutline(const std::string& path, const Json& json);
+Outline ReadOutline(const std::string& path, std::vector<std::string>* left_out = nullptr);
+// From a JSON text that is named `path` in messages. left_out: buildings that are no solids, or
+// have the name of another one, are left out and their sentences added to it; null = they throw.
+Outline ParseOutline(const std::string& path, const Json& json,
+                     std::vector<std::string>* left_out = nullptr);
 Json OutlineToJson(const Outline& outline);
 // With its numbers as the file holds them.
 OutlineBuilding AsWritten(OutlineBuilding building);

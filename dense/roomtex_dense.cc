@@ -1,6 +1,5 @@
 // roomtex-dense: surfaces from photos where the scan has none.
 
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -14,6 +13,7 @@
 #include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/resource_limits.h"
+#include "core/standard_files.h"
 #include "core/surfels.h"
 #include "dense/dense.h"
 #include "importers/scan_reader.h"
@@ -182,7 +182,7 @@ void Dense(const DenseCommandOptions& options, const Command::Context& context) 
   FillReport(result, context);
   context.report["entries"] = outputs->Entries();
   CommitWithReport("report.json", outputs);
-  std::printf("%s\n", (options.output_path + "/supplement.ply").c_str());
+  AnswerAtEnd(options.output_path + "/supplement.ply\n");
 }
 
 }  // namespace

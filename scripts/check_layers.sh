@@ -36,7 +36,7 @@ declare -A allowed=(
   [building/window]="$below building"
   [dense]="$below"
 
-  [workflow]="core"
+  [workflow]="core importers"
 
   [capture]="$below capture/pattern capture/simulation"
   [capture/pattern]="$below"

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/input_guard.h"
+#include "core/photo.h"
 #include "core/photo_files.h"
 #include "core/result_names.h"
 #include "core/text.h"
@@ -84,13 +85,15 @@ CommandLine ExtractorLine(Chain* chain, bool uses_gpu) {
   return line;
 }
 
-// A list of photos that one command line is for.
-void AddList(const std::vector<std::string>& names, const std::string& path, CommandLine* line,
-             Step* step) {
+// A list of photos that one command line is for. It is written, and counts as what the step was
+// made from, also where these are all photos, so that COLMAP needs no list: hidden photos that come
+// and go change the line then, but not what is made.
+void AddList(const std::vector<std::string>& names, const std::string& path, bool is_needed,
+             CommandLine* line, Step* step) {
   std::string list;
   for (const std::string& name : names) list += name + "\n";
   step->files.emplace_back(path, list);
-  AddOption("--image_list_path", path, line);
+  if (is_needed) AddOption("--image_list_path", path, line);
 }
 
 // The scanner's photos have the cameras of their file; where these are many, COLMAP guesses one for
@@ -135,8 +138,8 @@ void AddScannerPhotos(Chain* chain, const CommandLine& start, Step* step) {
     num_photos += names.size();
     CommandLine line = ScannerLine(start, camera, are_told);
     if (are_told) ++number;
-    AddList(names, chain->At("log/photos_of_scanner_" + std::to_string(number) + ".txt"), &line,
-            step);
+    AddList(names, chain->At("log/photos_of_scanner_" + std::to_string(number) + ".txt"), true,
+            &line, step);
     AddPassed(WithoutLenses(chain->options().passed.features), &line);
     step->commands.push_back(line);
     names.clear();
@@ -171,14 +174,51 @@ void AddLensOfPhotosAlone(Chain* chain, CommandLine* line) {
   }
 }
 
+bool CanBeRead(const std::string& path) {
+  try {
+    ReadGreyPhoto(path, 8);
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+// Files that are empty, or no pictures at all; a size that their header does not tell says no more
+// than that one has to look. True if there are some.
+bool SetUnreadableAside(const std::string& folder, std::vector<PhotoGroup>* groups,
+                        std::vector<std::string>* notes) {
+  std::string unreadable;
+  for (PhotoGroup& group : *groups) {
+    if (group.width > 0) continue;
+    std::vector<std::string> readable;
+    for (const std::string& name : group.names) {
+      if (CanBeRead(folder + "/" + name)) {
+        readable.push_back(name);
+      } else {
+        unreadable += (unreadable.empty() ? "" : ", ") + name;
+      }
+    }
+    group.names = readable;
+  }
+  groups->erase(std::remove_if(groups->begin(), groups->end(),
+                               [](const PhotoGroup& group) { return group.names.empty(); }),
+                groups->end());
+  if (unreadable.empty()) return false;
+  if (groups->empty()) {
+    throw InputError(folder, "", "holds no photo that can be read: not " + unreadable,
+                     "Copy the photos again");
+  }
+  notes->push_back("left out, since they cannot be read: " + unreadable);
+  return true;
+}
+
 // The photos of one camera, as the step's next command.
 void AddGroup(Chain* chain, const PhotoGroup& group, const PhotoGroup& largest,
               const CommandLine& start, bool with_list, Step* step) {
   CommandLine line = start;
-  if (with_list) {
-    const std::string number = std::to_string(step->commands.size() + 1);
-    AddList(group.names, chain->At("log/photos_of_camera_" + number + ".txt"), &line, step);
-  }
+  const std::string number = std::to_string(step->commands.size() + 1);
+  AddList(group.names, chain->At("log/photos_of_camera_" + number + ".txt"), with_list, &line,
+          step);
   AddOption("--ImageReader.single_camera", "1", &line);
   AddCamera(group, largest, chain->options(), &line, &step->notes);
   step->commands.push_back(line);
@@ -190,10 +230,11 @@ Step MakeFeatures(Chain* chain) {
   const CommandLine start = ExtractorLine(chain, UsesGpu(chain, &step.notes));
   const std::string folder = chain->ColmapFolder();
   const bool has_scanner = !chain->KnownPath().empty();
-  const std::vector<PhotoFacts>& photos =
-      chain->Photos(has_scanner ? chain->PhotoFolder() : folder);
-  const std::vector<PhotoGroup> groups = GroupByCamera(photos);
-  const bool has_others = has_scanner || HasHiddenPhotos(folder);  // that these lines are not for
+  const std::string of_photos = has_scanner ? chain->PhotoFolder() : folder;
+  const std::vector<PhotoFacts>& photos = chain->Photos(of_photos);
+  std::vector<PhotoGroup> groups = GroupByCamera(photos);
+  bool has_others = has_scanner || HasHiddenPhotos(folder);  // that these lines are not for
+  has_others |= SetUnreadableAside(of_photos, &groups, &step.notes);
   step.inputs = {folder};
   step.outputs = {chain->At(kPartialDatabase)};
   if (!options.cameras_path.empty()) step.inputs.push_back(options.cameras_path);
@@ -224,9 +265,8 @@ Step MakeFeatures(Chain* chain) {
     }
     if (!others.empty()) {
       CommandLine line = start;
-      if (has_others || !step.commands.empty()) {
-        AddList(others, chain->At("log/photos_of_other_cameras.txt"), &line, &step);
-      }
+      AddList(others, chain->At("log/photos_of_other_cameras.txt"),
+              has_others || !step.commands.empty(), &line, &step);
       const std::string model = ModelOfFew(options);
       AddOption("--ImageReader.camera_model", model, &line);
       step.commands.push_back(line);

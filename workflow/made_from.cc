@@ -38,6 +38,9 @@ bool IsThreads(const std::string& option) {
   return option == "--num_threads" || EndsWith(option, ".num_threads");
 }
 
+// The list that it leads to counts by its content (Step::files).
+bool IsList(const std::string& option) { return option == "--image_list_path"; }
+
 bool TakesPath(const std::string& option) {
   return EndsWith(option, "_path") || option == "--scan_poses";
 }
@@ -137,7 +140,8 @@ std::string PathNames::Essential(const CommandLine& line) const {
   for (size_t i = 1; i < line.size(); ++i) {
     const bool is_option = BeginsWith(line[i], "-");
     const bool has_value = is_option && !is_file_tool && i + 1 < line.size();
-    if (is_option && (IsThreads(line[i]) || (is_frames && !CountsForFrames(line[i])))) {
+    if (is_option &&
+        (IsThreads(line[i]) || IsList(line[i]) || (is_frames && !CountsForFrames(line[i])))) {
       ++i;
     } else if (has_value && TakesPath(line[i])) {
       essential.push_back(line[i]);

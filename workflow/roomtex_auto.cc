@@ -9,6 +9,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "core/child_program.h"
@@ -168,6 +169,17 @@ void TellStop(const Stop& stop, const Command::Context& context) {
   }
 }
 
+// Of the largest process of this run.
+int64_t PeakMemoryWithPrograms() {
+  int64_t kilobytes = 0;
+  for (const auto who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    getrusage(who, &usage);
+    kilobytes = std::max<int64_t>(kilobytes, usage.ru_maxrss);
+  }
+  return kilobytes * 1024;
+}
+
 void WriteReport(Chain* chain, const RunResult& result, const Command::Context& context) {
   context.progress.Stage("report");
   Json keys = MakeReportKeys(chain, result);
@@ -177,6 +189,8 @@ void WriteReport(Chain* chain, const RunResult& result, const Command::Context& 
   if (!result.stop.stopped && verdict["state"] != "trusted") {
     context.report.SetUnfinished(verdict["headline"].get<std::string>() + ".");
   }
+  // The report's own figure is of this program, which only waits for those of the steps.
+  context.report["peak_memory_bytes"] = PeakMemoryWithPrograms();
   context.report.AddCopyOfAnyEnd(chain->At("report.json"));
   std::printf("%s\n%s\n", verdict["headline"].get<std::string>().c_str(),
               chain->At("report.html").c_str());

@@ -1,6 +1,5 @@
 // roomtex-site: one page over all rooms of a site, from what roomtex-auto reported of each.
 
-#include <cstdio>
 #include <filesystem>
 
 #include "core/command_line.h"
@@ -8,6 +7,7 @@
 #include "core/error.h"
 #include "core/input_guard.h"
 #include "core/output_file.h"
+#include "core/standard_files.h"
 #include "workflow/site_page.h"
 #include "workflow/site_rooms.h"
 
@@ -54,13 +54,12 @@ void ReportSite(const SiteOptions& options, const Command::Context& context) {
     names += (names.empty() ? "" : ", ") + room["name"].get<std::string>() + " (" +
              room["headline"].get<std::string>() + ")";
   }
-  if (!names.empty()) context.report.SetUntrusted("look after " + names);
+  if (!names.empty()) context.report.SetUntrusted("look after " + names + ".");
   const Json& joined = keys["joined"];
   if (!joined.is_null() && !joined["trusted"].get<bool>()) {
     context.report.SetUntrusted(joined["reason"].get<std::string>());
   }
-  std::printf("%s\n%s\n", keys["verdict"]["headline"].get<std::string>().c_str(),
-              options.output_path.c_str());
+  AnswerAtEnd(keys["verdict"]["headline"].get<std::string>() + "\n" + options.output_path + "\n");
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "core/output_file.h"
 #include "core/text.h"
 #include "workflow/align_remedies.h"
+#include "workflow/late_inputs.h"
 #include "workflow/made_from.h"
 #include "workflow/output_folder.h"
 #include "workflow/remaining_time.h"
@@ -42,6 +43,7 @@ class StepRunner {
 
   RunResult Run() {
     RequireOwnResults(&chain_, state_);
+    CheckLateInputs();
     PlanTime();
     for (const StepRow& row : StepTable()) {
       ThrowIfInterrupted();
@@ -68,6 +70,22 @@ class StepRunner {
   }
 
   // ---- which steps
+
+  // Not where roomtex-align is the first to run, which says the same, or has read them as they are.
+  // Where it is not asked for (a site runs step by step) when nothing has been made yet.
+  void CheckLateInputs() {
+    const StepRow* const align = RowOf("align");
+    if (!align->applies(&chain_) || asked_.first >= IndexOfStep(align->name)) return;
+    const bool is_begun =
+        std::any_of(StepTable().begin(), StepTable().end(),
+                    [this](const StepRow& row) { return state_.Find(row.name) != nullptr; });
+    if (IsAskedFor(align->name, chain_.options()) ? IsUpToDate(*align) : is_begun) return;
+    context_.progress.Stage("look at scans");
+    RequireReadableScans(chain_.options());
+    if (!chain_.PicksPath().empty()) RequireReadablePicks(chain_.PicksPath());
+    context_.progress.Finish();
+    ThrowIfInterrupted();
+  }
 
   bool IsForced() const { return !chain_.options().only.empty() || !chain_.options().from.empty(); }
   bool WholeUntil(const std::string& last) const {

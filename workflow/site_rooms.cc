@@ -62,6 +62,13 @@ class RoomMaker {
             {"What it printed: " + json_["name"].get<std::string>() + "/log/" + step + ".log"});
       }
       if (record->state == StepState::kStarted) {
+        // roomtex-auto itself ended there, or was refused since: run_step.sh has kept what it said.
+        if (IsNewer(kRefused, "/steps.json")) {
+          const std::string said = LastWords(kRefused);
+          return Set("failed", "The step " + step + " did not end",
+                     said.empty() ? Texts() : Texts{said},
+                     {"What it printed last: " + json_["name"].get<std::string>() + kRefused});
+        }
         return Set("unfinished", "The step " + step + " runs still, or was killed", {});
       }
     }
@@ -76,11 +83,13 @@ class RoomMaker {
   }
 
   // The last start ended before it could write anything: the report is of an earlier one.
-  bool WasRefused() const {
-    std::error_code none, no_report;
-    const auto time = fs::last_write_time(folder_ + kRefused, none);
-    const auto report_time = fs::last_write_time(folder_ + "/report.json", no_report);
-    return !none && (no_report || time >= report_time);
+  bool WasRefused() const { return IsNewer(kRefused, "/report.json"); }
+  // The first file is there, and the second was not written after it.
+  bool IsNewer(const std::string& first, const std::string& second) const {
+    std::error_code none, no_other;
+    const auto time = fs::last_write_time(folder_ + first, none);
+    const auto other = fs::last_write_time(folder_ + second, no_other);
+    return !none && (no_other || time >= other);
   }
   void SayRefusal() {
     const std::string said =

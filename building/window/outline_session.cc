@@ -41,7 +41,7 @@ OutlineSession::OutlineSession(const OutlineWindowInput& input, OutlineCloud clo
   const bool goes_on = std::filesystem::exists(input_.output_path);
   if (goes_on || !input_.outline_path.empty()) {
     const std::string& path = goes_on ? input_.output_path : input_.outline_path;
-    outline_ = ReadOutline(path);
+    outline_ = ReadOutline(path, &left_out_);
     if (input_.geo_origin) PlaceOnEarth(*input_.geo_origin, path, &outline_);
     // The model that is there now says how far it may be believed.
     if (cloud_.frame.alignment) outline_.alignment = cloud_.frame.alignment;
@@ -82,6 +82,7 @@ Json OutlineSession::State() {
   json["version"] = Version();
   json["output_path"] = input_.output_path;
   json["model_paths"] = input_.model_paths;
+  json["left_out"] = left_out_;
   json["unit"] = outline_.metric ? "m" : "units";
   json["on_earth"] = outline_.geo.has_value();
   const GroundPlane ground = FindGround(cloud_, segments_);

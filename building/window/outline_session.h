@@ -35,6 +35,10 @@ class OutlineSession {
 
   OutlineProposal Judged();
 
+  // Sentences on buildings of the file that cannot be shown: they are left out, and the file is
+  // kept as it was with .bak behind its name when the first change is saved.
+  const std::vector<std::string>& left_out() const { return left_out_; }
+
  private:
   Json Buildings();
   void CheckRevision(const Json& request) const;
@@ -47,6 +51,7 @@ class OutlineSession {
   OutlineCloud cloud_;
   std::vector<PlaneSegment> segments_;
   Outline outline_;
+  std::vector<std::string> left_out_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of the points as they are sent
   int revision_ = 1, points_revision_ = 1;
   std::string save_error_;

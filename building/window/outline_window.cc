@@ -10,6 +10,9 @@ OutlineProposal RunOutlineWindow(const OutlineWindowInput& input, OutlineCloud c
                                  const Command::Context& context) {
   context.progress.Stage("prepare");
   OutlineSession session(input, std::move(cloud), std::move(segments));
+  for (const std::string& sentence : session.left_out()) {
+    context.Warn("left out of the page, and of what it saves: " + sentence);
+  }
   using Query = LocalServer::Query;
   LocalServer server(input.server);
   AddPage(input.page, &server);

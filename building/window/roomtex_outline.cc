@@ -1,7 +1,6 @@
 // roomtex-outline: buildings from the points of a model or a cloud (thesis 9.3).
 
 #include <filesystem>
-#include <iostream>
 
 #include "building/building_output.h"
 #include "building/building_solid.h"
@@ -12,6 +11,7 @@
 #include "core/commit_together.h"
 #include "core/error.h"
 #include "core/option_fields.h"
+#include "core/standard_files.h"
 #include "core/text.h"
 #include "importers/scan_record.h"
 #ifdef ROOMTEX_PAGES
@@ -225,11 +225,11 @@ void PrintOutline(const OutlineProposal& proposal, bool judged) {
   for (size_t i = 0; i < proposal.outline.buildings.size(); ++i) {
     const OutlineBuilding& building = proposal.outline.buildings[i];
     const Json json = BuildingToJson(building, judged ? &proposal.evidence[i] : nullptr);
-    std::cout << building.name << ": " << building.footprint.size() << " corners, "
-              << building.RoofShape() << " roof, ground " << Number(building.ground, 2)
-              << ", eaves " << Number(json["eaves"].get<double>(), 2) << ", ridge "
-              << Number(json["ridge"].get<double>(), 2)
-              << (judged && !proposal.evidence[i].doubts.empty() ? ", doubtful" : "") << "\n";
+    AnswerAtEnd(building.name + ": " + std::to_string(building.footprint.size()) + " corners, " +
+                building.RoofShape() + " roof, ground " + Number(building.ground, 2) + ", eaves " +
+                Number(json["eaves"].get<double>(), 2) + ", ridge " +
+                Number(json["ridge"].get<double>(), 2) +
+                (judged && !proposal.evidence[i].doubts.empty() ? ", doubtful" : "") + "\n");
   }
 }
 

@@ -46,6 +46,18 @@ double RootMeanSquare(const cv::Mat1f& values, const cv::Mat1b& clipped) {
   return count > 0 ? std::sqrt(squares / count) : 0;
 }
 
+// Sum of products where nothing is clipped.
+double ProductSum(const cv::Mat1f& a, const cv::Mat1f& b, const cv::Mat1b& clipped) {
+  double sum = 0;
+  for (int row = 0; row < a.rows; ++row) {
+    for (int column = 0; column < a.cols; ++column) {
+      if (clipped(row, column) != 0) continue;
+      sum += static_cast<double>(a(row, column)) * b(row, column);
+    }
+  }
+  return sum;
+}
+
 cv::Mat1b MovedBack(const cv::Mat1b& image, const Eigen::Vector2d& shift) {
   const cv::Matx23d move(1, 0, shift.x(), 0, 1, shift.y());
   cv::Mat1b moved;
@@ -133,6 +145,8 @@ LightComparison CompareLight(const PhotoSummary& first, const PhotoSummary& seco
   const cv::Mat1f detail_of_a = BandOf(light_of_a, 0.7, 4),
                   detail_of_b = BandOf(light_of_b, 0.7, 4);
   double tiles = 0, changed = 0, squares_a = 0, squares_b = 0;
+  // Of the change, which is b - a: what came with b, and what went with a.
+  double came = 0, went = 0;
   for (int y = 0; y + kLightTile <= a.rows; y += kLightTile) {
     for (int x = 0; x + kLightTile <= a.cols; x += kLightTile) {
       const cv::Rect tile(x, y, kLightTile, kLightTile);
@@ -146,10 +160,13 @@ LightComparison CompareLight(const PhotoSummary& first, const PhotoSummary& seco
       changed += 1;
       squares_a += in_a * in_a;
       squares_b += in_b * in_b;
+      came += ProductSum(change(tile), detail_of_b(tile), clipped(tile));
+      went -= ProductSum(change(tile), detail_of_a(tile), clipped(tile));
     }
   }
   result.changed_share = tiles > 0 ? changed / tiles : 0;
   result.same_light = result.changed_share < kLeastChanged;
+  if (came + went > 0) result.two_sided = std::max(0.0, std::min(came, went) / (came + went));
   if (changed > 0) result.detail_ratio = std::sqrt(squares_b / std::max(squares_a, 1e-12));
   return result;
 }

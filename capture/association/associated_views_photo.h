@@ -40,7 +40,10 @@ PlaceComparison ComparePlaces(const PhotoSummary& first, const PhotoSummary& sec
 struct LightComparison {
   // Share of the picture where one has detail that the other lacks.
   double changed_share = 0;
-  bool same_light = false;      // both patterned, or both plain
+  bool same_light = false;  // both patterned, or both plain
+  // Where it changed, the part of the change that is detail of the photo that has less of its own:
+  // 0 = a pattern over a plain photo, whose detail the other has as well; 0.5 = two patterns.
+  double two_sided = 0;
   double detail_ratio = 1;      // detail of the second over that of the first, where it changed
   double brightness_ratio = 1;  // linear light, second over first; EXIF exposures taken out
   bool exif_brightness = false;

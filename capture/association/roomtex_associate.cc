@@ -1,7 +1,6 @@
 // roomtex-associate: which photos show the same with and without the projected pattern.
 
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
 #include <opencv2/core/utility.hpp>
@@ -13,6 +12,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/photo_files.h"
+#include "core/standard_files.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -104,7 +104,7 @@ void Run(const Arguments& arguments, const Command::Context& context) {
     context.report.SetUntrusted(reason);
   }
   context.progress.Finish();
-  std::printf("%s\n", arguments.output_path.c_str());
+  AnswerAtEnd(arguments.output_path + "\n");
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 // roomtex-calibrate: the camera from photos of a board. Parses, calls, reports.
 
-#include <cstdio>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -22,6 +21,7 @@
 #include "core/output_file.h"
 #include "core/photo_files.h"
 #include "core/picture_file.h"
+#include "core/standard_files.h"
 
 namespace roomtex {
 namespace {
@@ -124,7 +124,7 @@ void Run(Arguments* a, const Command::Context& context) {
   const Board board = MakeBoard(a->board);
   if (!a->board_path.empty()) WriteBoardPdf(board, a->board_path);
   if (a->image_path.empty()) {
-    std::printf("%s\n", a->board_path.c_str());
+    AnswerAtEnd(a->board_path + "\n");
     return;
   }
   const std::vector<std::string> names =
@@ -150,7 +150,7 @@ void Run(Arguments* a, const Command::Context& context) {
   if (!a->coverage_path.empty()) WritePictureFile(a->coverage_path, DrawCalibration(calibration));
   Apply(*a, calibration.camera, context);
   context.progress.Note(FocalLengthLine(calibration));
-  std::printf("%s\n", FeatureExtractorOptions(calibration.camera, kLensDigits).c_str());
+  AnswerAtEnd(FeatureExtractorOptions(calibration.camera, kLensDigits) + "\n");
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <limits>
 
@@ -18,6 +17,7 @@
 #include "core/parallel.h"
 #include "core/photo.h"
 #include "core/resource_limits.h"
+#include "core/standard_files.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -214,7 +214,7 @@ void Run(const Arguments& arguments, const Command::Context& context) {
                 context);
   }
   context.progress.Finish();
-  if (!arguments.output_path.empty()) std::printf("%s\n", arguments.output_path.c_str());
+  if (!arguments.output_path.empty()) AnswerAtEnd(arguments.output_path + "\n");
 }
 
 }  // namespace

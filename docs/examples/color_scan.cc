@@ -26,7 +26,9 @@ int main(int argc, char** argv) try {
   if (!alignment.reasons.empty()) return 4;
   TransformModel(alignment.scan_from_sparse, &model);
 
-  const PhotoList list = ListPhotos(model, {argv[4], "", ""});
+  PhotoSources sources;
+  sources.image_path = argv[4];
+  const PhotoList list = ListPhotos(model, sources);
   const ColorizeResult colored =
       ColorizeScans(scans, list.photos, ColorizeOptions(), /*num_threads=*/-1, &progress);
   WriteColoredPly(scans, colored.scans, argv[5]);

@@ -143,6 +143,29 @@ TEST(BuildingSolid, IsTheSameWhereverTheBuildingStands) {
   }
 }
 
+// As a traced contour has them; not convex, so that the lines of its edges cross each other nearly
+// everywhere.
+TEST(BuildingSolid, OfAThousandCornersIsMadeInNoTime) {
+  std::vector<Eigen::Vector2d> footprint;
+  constexpr int kCorners = 1000;
+  for (int i = 0; i < kCorners; ++i) {
+    const double angle = 2 * kPi * i / kCorners, radius = 20 + 4 * std::sin(7 * angle) + i % 2;
+    footprint.emplace_back(radius * std::cos(angle), radius * std::sin(angle));
+  }
+  const OutlineBuilding flat = Building(footprint, {Plane(0, 0, 5, 0, 0)});
+  const OutlineBuilding gable =
+      Building(footprint, {Plane(0, 0, 20, 30, 17), Plane(0, 0, 20, 30, 197)});
+  const auto begin = std::chrono::steady_clock::now();
+  const BuildingSolid flat_solid = ExtrudeBuilding(flat), gable_solid = ExtrudeBuilding(gable);
+  ExpectSolid(flat, 4 * PolygonArea(footprint), "flat");
+  ExpectSolid(gable, gable_solid.Volume(), "gable");
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+  EXPECT_LT(seconds.count(), 15);  // 56 each where every edge cut all others
+  EXPECT_EQ(flat_solid.faces.size(), kCorners + 2u);
+  EXPECT_EQ(flat_solid.vertices.size(), 2u * kCorners);
+  EXPECT_EQ(gable_solid.faces.size(), kCorners + 3u);
+}
+
 TEST(CellArrangement, CellsFillTheBoxAndOutlinesEncloseTheirUnion) {
   std::vector<Line2> lines;
   for (int i = 0; i < 12; ++i) {

@@ -33,6 +33,7 @@ TEST(Library, ExampleBuildsAgainstTheInstalledPackageAndColoursAScan) {
   ASSERT_EQ(installed.exit_code, 0) << installed.err;
   const CommandResult built = BuildProject("docs/examples", folder / "prefix", folder / "example");
   ASSERT_EQ(built.exit_code, 0) << built.out << built.err;
+  EXPECT_EQ((built.out + built.err).find("warning"), std::string::npos) << built.out << built.err;
 
   const std::string capture = folder / "capture";
   WriteCaptureAndModel(capture);

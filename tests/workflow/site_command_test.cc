@@ -152,6 +152,27 @@ TEST_F(SiteCommand, SaysOfARoomThatItsLastStartWasRefused) {
   EXPECT_EQ(Site()["rooms"][0]["sentences"][0], "a.e57: is no E57");
 }
 
+// roomtex-auto itself ended in the middle of a step: nothing runs any more.
+TEST_F(SiteCommand, SaysOfAStepThatItEndedWhereTheCommandDid) {
+  AddStep("hall", "mapper", StepState::kStarted);
+  EXPECT_EQ(Run().exit_code, 4);
+  EXPECT_EQ(Site()["rooms"][0]["headline"], "The step mapper runs still, or was killed");
+  WriteBytes(folder_ / "hall/log/refused",
+             "mapper 12 s\nroomtex-auto: the disk is full\nSee somewhere\n");
+  EXPECT_EQ(Run().exit_code, 4);
+  const json failed = Site()["rooms"][0];
+  EXPECT_EQ(failed["state"], "failed");
+  EXPECT_EQ(failed["headline"], "The step mapper did not end");
+  EXPECT_EQ(failed["sentences"][0], "the disk is full");
+  EXPECT_EQ(failed["remedies"][0], "What it printed last: hall/log/refused");
+  // Started again.
+  std::filesystem::last_write_time(
+      folder_ / "hall/steps.json",
+      std::filesystem::file_time_type::clock::now() + std::chrono::seconds(1));
+  EXPECT_EQ(Run().exit_code, 4);
+  EXPECT_EQ(Site()["rooms"][0]["state"], "unfinished");
+}
+
 TEST_F(SiteCommand, TrustsASiteOfWhichEveryRoomIsTrusted) {
   for (const char* room : {"b", "a"}) {
     AddStep(room, "align", StepState::kDone);

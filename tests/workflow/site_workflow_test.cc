@@ -35,12 +35,12 @@ class SiteWorkflow : public testing::Test {
       GTEST_SKIP() << "Snakemake is not installed (scripts/setup.sh --site)";
     }
   }
-  CommandResult RunSite(const std::string& more = "") {
+  CommandResult RunSite(const std::string& more = "", const std::string& bin = BinFolder()) {
     const std::string site = ROOMTEX_SITE_FOLDER;
     CommandResult result = RunProgram(
         "snakemake -s " + site + "/Snakefile --profile " + site + "/local --directory " +
-        folder_.path() + " --cores 2 --config photos_per_part=6 'options=--quality low' bin=" +
-        BinFolder() + " " + more);
+        folder_.path() +
+        " --cores 2 --config photos_per_part=6 'options=--quality low' bin=" + bin + " " + more);
     result.err += result.out;
     return result;
   }
@@ -227,6 +227,48 @@ std::map<std::string, int> AskedOf(const std::string& dry_run, const std::string
     asked[rule] = std::stoi(line.substr(at + resource.size() + 2));
   }
   return asked;
+}
+
+// Programs in place of those that take time: the room `attic` is not to be trusted, and what is to
+// be joined is written down.
+TEST_F(SiteWorkflow, DoesNotJoinRoomsIntoAFrameThatIsNotThere) {
+  const auto add_program = [this](const std::string& name, const std::string& script) {
+    fs::create_directories(folder_ / "bin");
+    WriteBytes(folder_ / ("bin/" + name), "#!/bin/sh\n" + script);
+    fs::permissions(folder_ / ("bin/" + name), fs::perms::owner_all);
+  };
+  add_program("roomtex-auto", "case \"$*\" in *result/attic*align*) exit 4;; esac\n");
+  const std::string joined_rooms =
+      R"({"trusted": true, "reason": "", "rooms": [], "links": [], "loops": [], "scene": null})";
+  add_program("roomtex-join", "echo \"$*\" >>" + (folder_ / "joins") + "\necho '" + joined_rooms +
+                                  "' >" + At("joined/joined.json") + "\n");
+  fs::create_symlink(BinFolder() + "/roomtex-site", folder_ / "bin/roomtex-site");
+  std::string table = "room,photos,scans\n";
+  for (const char* room : {"hall", "attic", "cellar"}) {
+    fs::create_directories(folder_ / ("photos/" + std::string(room)));
+    table += std::string(room) + ",photos/" + room + ",s.rtpi\n";
+  }
+  WriteBytes(folder_ / "site.csv", table);
+  WriteBytes(folder_ / "s.rtpi", "a scan");
+  // Of an earlier run, when the attic was trusted.
+  fs::create_directories(At("joined"));
+  WriteBytes(At("joined/joined.json"), R"({"reference": "attic", "rooms": [{"name": "hall"}]})");
+  WriteBytes(At("joined/hall.txt"), "a matrix");
+  const CommandResult result = RunSite("reference=attic", folder_ / "bin");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_FALSE(fs::exists(folder_ / "joins"));
+  EXPECT_FALSE(fs::exists(At("joined/hall.txt")));
+  const json joined = json::parse(ReadBytes(At("joined/joined.json")));
+  EXPECT_EQ(joined["trusted"], false);
+  EXPECT_THAT(ReadBytes(At("site.html")),
+              HasSubstr("The reference attic is not aligned so that it can be trusted"));
+  // Without it the first of those that are.
+  EXPECT_EQ(RunSite("", folder_ / "bin").exit_code, 0);
+  EXPECT_THAT(ReadBytes(folder_ / "joins"),
+              HasSubstr("--input_path=result/hall/aligned --input_path=result/cellar/aligned"));
+  const CommandResult stranger = RunSite("reference=tower", folder_ / "bin");
+  EXPECT_NE(stranger.exit_code, 0);
+  EXPECT_THAT(stranger.err, HasSubstr("reference=tower is no room of the site"));
 }
 
 TEST_F(SiteWorkflow, AsksForTwiceTheMemoryAndTimeWithEveryTry) {

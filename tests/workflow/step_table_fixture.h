@@ -53,6 +53,17 @@ class StepTableTest : public testing::Test {
     }
   }
 
+  // A scan that can be read: points without a grid. Its path.
+  std::string AddScan(const std::string& name) {
+    std::string points;
+    for (int i = 0; i < 400; ++i) {
+      points += std::to_string(0.1 * (i % 20)) + " " + std::to_string(i / 20) + " " +
+                std::to_string(0.01 * (i % 7)) + "\n";
+    }
+    WriteBytes(folder_ / name, points);
+    return folder_ / name;
+  }
+
   Step Make(const std::string& name) {
     Chain chain(options_);
     for (const StepRow& row : StepTable()) {

@@ -46,12 +46,10 @@ TEST_F(StepTableTest, OnlyPhotosInTheFolderOfPhotosCount) {
                                      "for word; do [ \"$last\" = --database_path ] && echo >$word; "
                                      "last=$word; done\ntrue\n");
   AddPhotos("a", 3, 64);
-  WriteBytes(folder_ / "room.ptx", "1\n");
-  const auto start = [this] {
-    const CommandResult result =
-        RunCommandLine("roomtex-auto --until features --image_path " + options_.image_path +
-                       " --scan_path " + (folder_ / "room.ptx") + " --output_path " +
-                       options_.output_path + " --colmap " + options_.colmap);
+  const auto start = [this, scan = AddScan("room.xyz")] {
+    const CommandResult result = RunCommandLine(
+        "roomtex-auto --until features --image_path " + options_.image_path + " --scan_path " +
+        scan + " --output_path " + options_.output_path + " --colmap " + options_.colmap);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.err;
   };
@@ -116,6 +114,21 @@ TEST_F(StepTableTest, CopiesThatAnotherProgramHidesAreNotForColmap) {
   EXPECT_THAT(CommandText(step.commands.at(0)), HasSubstr("--image_list_path"));
   ASSERT_EQ(step.files.size(), 1u);
   EXPECT_EQ(step.files[0].second, "a100.jpg\na101.jpg\na102.jpg\n");
+}
+
+TEST_F(StepTableTest, PhotosThatCannotBeReadAreNamedAndNotForColmap) {
+  AddPhotos("a", 3, 64);
+  WriteBytes(folder_ / "photos/empty.jpg", "");
+  WriteBytes(folder_ / "photos/text.png", "no picture");
+  const Step step = Make("features");
+  ASSERT_EQ(step.commands.size(), 1u);
+  EXPECT_THAT(CommandText(step.commands[0]), HasSubstr("--image_list_path"));
+  EXPECT_EQ(step.files.at(0).second, "a100.jpg\na101.jpg\na102.jpg\n");
+  EXPECT_THAT(step.notes, Contains("left out, since they cannot be read: empty.jpg, text.png"));
+  for (const char* name : {"a100.jpg", "a101.jpg", "a102.jpg"}) {
+    fs::remove(folder_ / (std::string("photos/") + name));
+  }
+  EXPECT_THROW(Make("features"), InputError);
 }
 
 TEST_F(StepTableTest, AFewPhotosGetALensOfFewParameters) {

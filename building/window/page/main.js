@@ -873,6 +873,8 @@ async function load() {
   for (const id of ['ground', 'eaves', 'ridge']) byId(id).step = 10 ** -numDigits();
   take(app.state);
   refresh(true);
+  const leftOut = app.state.left_out ?? [];
+  if (leftOut.length > 0) say(`Not shown, and not saved with what you change here: ${leftOut.join(' ')}`, 60);
 }
 
 listen();

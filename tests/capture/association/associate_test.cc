@@ -259,6 +259,27 @@ TEST_F(Associate, LeavesAPhotoWithoutACleanPlainOneAlone) {
   EXPECT_THAT(ReasonOf(found, "a.jpg"), HasSubstr("b.jpg of its place has a pattern itself"));
 }
 
+// Each of two projectors alone: neither photo is the other's plain one, whichever is brighter or
+// has more detail.
+TEST_F(Associate, PairsNoTwoPatterns) {
+  Take other = Plain();
+  other.second_projector = true;
+  for (int place = 0; place < 4; ++place) {
+    other.ev = 0.3 * place - 0.5;
+    Save("p" + std::to_string(place) + "_one.jpg", place, Patterned());
+    Save("p" + std::to_string(place) + "_other.jpg", place, other);
+  }
+  Save("p4_both.jpg", 4, BothProjectors());
+  Save("p4_one.jpg", 4, Patterned());
+  const Associations alone = Find();
+  EXPECT_TRUE(alone.pairs.empty()) << alone.pairs[0].plain_image;
+  EXPECT_THAT(ReasonOf(alone, "p4_one.jpg"), HasSubstr("p4_both.jpg of its place has a pattern"));
+  // Both have the plain one where there is one.
+  Save("p2_plain.jpg", 2, Plain());
+  EXPECT_THAT(Names(Find()), ElementsAre(Pair("p2_one.jpg", "p2_plain.jpg"),
+                                         Pair("p2_other.jpg", "p2_plain.jpg")));
+}
+
 TEST_F(Associate, NamesASecondPlainPhoto) {
   Save("a.jpg", 0, Plain());
   Save("b.jpg", 0, Patterned());
