@@ -1,7 +1,6 @@
 // roomtex-mapper: COLMAP's mapper behind an initialiser that is not fooled by walls.
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -25,6 +24,7 @@
 #include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/result_names.h"
+#include "core/standard_files.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -356,10 +356,11 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   WriteModels(options, models, trusts, scratch);
   for (size_t i = 0; i < models.size(); ++i) {
     const MapperResult& result = *models[i].result;
-    std::printf("%s: %zu of %zu photos%s, %zu points, mean reprojection error %.3f px\n",
-                ModelPath(options, i).c_str(), result.model.images.size(), images.images().size(),
-                models[i].is_room ? ", of another room that is alike" : "",
-                result.model.points.size(), result.mean_reprojection_error_px);
+    AnswerAtEnd(fmt::format("{}: {} of {} photos{}, {} points, mean reprojection error {:.3f} px\n",
+                            ModelPath(options, i), result.model.images.size(),
+                            images.images().size(),
+                            models[i].is_room ? ", of another room that is alike" : "",
+                            result.model.points.size(), result.mean_reprojection_error_px));
   }
 }
 

@@ -1,11 +1,13 @@
 // roomtex-merge: matches that were made on copies of one database, in one.
 
-#include <cstdio>
 #include <memory>
+
+#include <fmt/core.h>
 
 #include "colmap_ext/database.h"
 #include "core/command_line.h"
 #include "core/output_file.h"
+#include "core/standard_files.h"
 
 namespace roomtex {
 namespace {
@@ -33,8 +35,8 @@ void Merge(const MergeOptions& options, const Command::Context& context) {
   context.report["num_images"] = database.ReadImages().size();
   context.report["num_pairs"] = after;
   context.report["num_pairs_added"] = after - before;
-  std::printf("%s: %zu pairs, %zu of them from %zu copies\n", options.output_path.c_str(), after,
-              after - before, copies.size());
+  AnswerAtEnd(fmt::format("{}: {} pairs, {} of them from {} copies\n", options.output_path, after,
+                          after - before, copies.size()));
 }
 
 }  // namespace

@@ -2,8 +2,9 @@
 
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
+
+#include <fmt/core.h>
 
 #include "colmap_ext/pair_selection.h"
 #include "core/command_line.h"
@@ -14,6 +15,7 @@
 #include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/photo.h"
+#include "core/standard_files.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -186,8 +188,9 @@ void FindPairs(const PairsCommandOptions& options, const Command::Context& conte
   context.report["num_agreeing"] = num_agreeing;
   context.report["num_in_database"] = selection.num_in_database;
   ReportGroups(selection, context);
-  std::printf("%s: %zu of %zu pairs, %zu photos in %zu groups\n", options.output_path.c_str(),
-              num_listed, num_images * (num_images - 1) / 2, num_images, selection.groups.size());
+  AnswerAtEnd(fmt::format("{}: {} of {} pairs, {} photos in {} groups\n", options.output_path,
+                          num_listed, num_images * (num_images - 1) / 2, num_images,
+                          selection.groups.size()));
 }
 
 }  // namespace

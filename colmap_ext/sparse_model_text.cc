@@ -17,7 +17,9 @@ constexpr std::string_view kSpaces = " \t\r\v\f";
 // The lines of a file, without the spaces around them; knows where it is.
 class LineReader {
  public:
-  LineReader(const std::string& bytes, const std::string& path) : rest_(bytes), path_(path) {}
+  LineReader(const std::string& bytes, const std::string& path) : rest_(bytes), path_(path) {
+    if (rest_.substr(0, 3) == "\xEF\xBB\xBF") rest_.remove_prefix(3);  // as editors of Windows
+  }
 
   long line() const { return line_; }
 

@@ -10,6 +10,8 @@
 
 #include <fmt/core.h>
 
+#include "core/utf8.h"
+
 namespace roomtex {
 
 std::string Number(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
@@ -60,31 +62,12 @@ bool BeginsWith(std::string_view text, std::string_view start) {
   return text.substr(0, start.size()) == start;
 }
 
-namespace {
-
-// Bytes of the UTF-8 character that begins at text[i]; 0 if none does.
-size_t CharacterBytes(std::string_view text, size_t i) {
-  const auto byte = [&](size_t k) { return static_cast<unsigned char>(text[k]); };
-  const size_t count = byte(i) < 0x80                      ? 1
-                       : byte(i) >= 0xc2 && byte(i) < 0xe0 ? 2
-                       : byte(i) >= 0xe0 && byte(i) < 0xf0 ? 3
-                       : byte(i) >= 0xf0 && byte(i) < 0xf5 ? 4
-                                                           : 0;
-  if (i + count > text.size()) return 0;
-  for (size_t k = i + 1; k < i + count; ++k) {
-    if ((byte(k) & 0xc0) != 0x80) return 0;
-  }
-  return count;
-}
-
-}  // namespace
-
 std::string Quoted(const std::string& text) {
   constexpr size_t kMaxBytes = 40;
   std::string shown;
   size_t i = 0;
   while (i < text.size()) {
-    const size_t count = CharacterBytes(text, i);
+    const size_t count = Utf8Bytes(text, i);
     if (i + std::max<size_t>(count, 1) > kMaxBytes) break;
     const bool is_control = static_cast<unsigned char>(text[i]) < 0x20 || text[i] == 0x7f;
     shown += count == 0 || is_control ? "?" : text.substr(i, count);

@@ -228,6 +228,7 @@ class GridFinder {
     scan.points.assign(cells, Scan::MissingPoint());
     scan.intensity.assign(cells, 0.0f);
     scan.normals.clear();
+    scan.num_left_out = 0;  // they have no sample in the grid
     if (!cloud_.colors.empty()) scan.colors.assign(cells, {0, 0, 0});
     size_t num_doubled = 0;
     for (size_t i = 0; i < cloud_.points.size(); ++i) {

@@ -12,6 +12,7 @@
 #include "core/output_file.h"
 #include "core/photo.h"
 #include "core/text.h"
+#include "core/utf8.h"
 #include "importers/e57_document.h"
 
 namespace fs = std::filesystem;
@@ -54,12 +55,14 @@ std::string KindName(E57Image::Kind kind) {
 
 // The name without folders, endings of pictures and what file systems do not take.
 std::string FileStem(const std::string& name) {
-  std::string stem = name.substr(0, kLongestName);
-  for (char& c : stem) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool fits = std::isalnum(byte) || byte >= 128 ||
-                      std::string_view("-_.+").find(c) != std::string_view::npos;
-    if (!fits) c = '_';
+  std::string stem;
+  for (size_t i = 0; i < name.size();) {
+    const size_t count = Utf8Bytes(name, i);
+    if (i + std::max<size_t>(count, 1) > kLongestName) break;
+    const bool fits = count > 1 || std::isalnum(static_cast<unsigned char>(name[i])) ||
+                      std::string_view("-_.+").find(name[i]) != std::string_view::npos;
+    stem += count > 0 && fits ? name.substr(i, count) : "_";
+    i += std::max<size_t>(count, 1);
   }
   for (const char* ending : {".jpg", ".jpeg", ".png", ".JPG", ".PNG"}) {
     const size_t size = std::string_view(ending).size();

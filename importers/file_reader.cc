@@ -87,11 +87,15 @@ bool LineReader::Refill() {
 }
 
 bool LineReader::Next(std::string_view* line) {
+  if (line_end_ == 0) {
+    Refill();
+    line_end_ = LineEndOf({block_.data(), end_});
+  }
   size_t searched = begin_;
   const char* newline = nullptr;
   while (true) {
     newline =
-        static_cast<const char*>(std::memchr(block_.data() + searched, '\n', end_ - searched));
+        static_cast<const char*>(std::memchr(block_.data() + searched, line_end_, end_ - searched));
     if (newline != nullptr) break;
     const size_t pending = end_ - begin_;
     if (pending == static_cast<size_t>(kBlockSize)) {
@@ -111,6 +115,15 @@ bool LineReader::Next(std::string_view* line) {
   *line = std::string_view(first, static_cast<size_t>(last - first));
   ++line_number_;
   return true;
+}
+
+char LineEndOf(std::string_view start) {
+  const size_t newline = start.find('\n');
+  std::string_view first = start.substr(0, newline);
+  while (!first.empty() && first.back() == '\r') first.remove_suffix(1);
+  const auto count = std::count(first.begin(), first.end(), '\r');
+  // Binary data behind a header hold any byte, and one '\r' may have got into a line.
+  return count >= (newline == std::string_view::npos ? 1 : 2) ? '\r' : '\n';
 }
 
 size_t SizeOfByteOrderMark(std::string_view start) {

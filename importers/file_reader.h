@@ -39,7 +39,12 @@ class FileReader {
 // Bytes of the mark that some programs put before UTF-8; 0 without one.
 size_t SizeOfByteOrderMark(std::string_view start);
 
-// The lines of a text file one after the other, without their line ends (LF, CR LF or CR CR LF).
+// What ends the lines of a text that begins so: '\n', or '\r' where several stand before the first
+// '\n' or there is none, as in files of old Macs.
+char LineEndOf(std::string_view start);
+
+// The lines of a text file one after the other, without their line ends (LF, CR LF, CR CR LF, or CR
+// alone in all of it).
 class LineReader {
  public:
   // The file must outlive this. `offset` is where line 1 starts;
@@ -62,6 +67,7 @@ class LineReader {
   std::vector<char> block_;
   int64_t block_offset_;  // of block_[0] in the file
   size_t begin_ = 0, end_ = 0;
+  char line_end_ = 0;  // not known yet
   long line_number_ = 0;
 };
 

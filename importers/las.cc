@@ -143,13 +143,17 @@ Scan ReadLas(const std::string& path, const LasOptions& options) {
               static_cast<int64_t>(block.size()));
     for (int64_t i = 0; i < count; ++i) {
       const char* const record = block.data() + i * header.record_size;
-      if ((record[15] & withheld) != 0) continue;
+      if ((record[15] & withheld) != 0) {
+        ++scan.num_left_out;
+        continue;
+      }
       Eigen::Vector3d point;
       for (int k = 0; k < 3; ++k) {
         point[k] = header.shift[k] + header.scale[k] * ValueAt<int32_t>(record + 4 * k);
       }
       if (options.max_range > 0 &&
           !(options.meters_per_unit * (point - header.middle).norm() <= options.max_range)) {
+        ++scan.num_left_out;
         continue;
       }
       scan.points.push_back(options.meters_per_unit * point);

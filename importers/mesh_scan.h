@@ -33,6 +33,13 @@ inline double GreyOf(const Eigen::Vector3d& rgb) {
 // InputError if no triangle is left.
 void FinishMesh(const std::string& path, double max_range, Scan* scan);
 
+// Metres from the origin along an axis: nothing that was measured lies beyond, in whatever unit and
+// coordinate system. What fits into 64 bits of micrometres ends there, too.
+inline constexpr double kFarthest = 1e12;
+// Points beyond kFarthest become missing, with the triangles at them, and those of a cloud go. How
+// many there were.
+size_t LeaveOutFar(Scan* scan);
+
 // The viewpoint of a mesh whose file does not say where it was scanned from: the middle of it,
 // unless the file's origin lies well within, as where a scanning app was started.
 void FindViewpoint(Scan* mesh);

@@ -31,8 +31,8 @@ std::vector<fs::path> FindPanoramas(const std::string& input_path) {
   std::error_code error;
   if (!fs::is_directory(input_path, error)) return {input_path};
   std::vector<fs::path> paths;
-  for (const std::string& name :
-       ListPhotoFiles(input_path, "Give a panorama or a folder of them", false)) {
+  for (const std::string& name : ListPhotoFiles(
+           input_path, "Give the file of a scan, a panorama, or a folder of panoramas", false)) {
     paths.push_back(fs::path(input_path) / name);
   }
   return paths;

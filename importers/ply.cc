@@ -22,6 +22,7 @@
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
 #include "importers/ply_header.h"
+#include "importers/ply_values.h"
 
 namespace roomtex {
 namespace {
@@ -34,161 +35,13 @@ std::string VectorComment(const char* what, const Eigen::Vector3d& v) {
          Exact(v[1]) + " " + Exact(v[2]) + "\n";
 }
 
-// The values of the body one after the other.
-class ValueSource {
- public:
-  virtual ~ValueSource() = default;
-  virtual void BeginEntry() = 0;
-  virtual double Next(PlyType type) = 0;
-  virtual void EndEntry() = 0;
-  virtual void EndFile() = 0;
-  virtual int64_t BytesLeft() const = 0;
-  virtual std::string Position() const = 0;  // of the entry read last
-};
-
-class AsciiSource : public ValueSource {
- public:
-  AsciiSource(const FileReader& file, const PlyHeader& header)
-      : path_(file.path()), lines_(file, header.body_offset), header_lines_(header.num_lines) {}
-
-  void BeginEntry() override {
-    do {
-      if (!lines_.Next(&rest_)) {
-        throw InputError(path_, LinePosition(header_lines_ + lines_.line_number() + 1),
-                         "the file ends, expected another line of numbers",
-                         "The file is cut off: copy it again");
-      }
-      line_ = rest_;
-      SkipBlanks();
-    } while (rest_.empty());
-  }
-  double Next(PlyType) override {
-    SkipBlanks();
-    const size_t size = std::min(rest_.find_first_of(" \t"), rest_.size());
-    double value = 0;
-    if (!ParseReal(rest_.substr(0, size), &value)) {
-      throw InputError(path_, Position(),
-                       "is " + Quoted(line_) + ", which lacks a number or holds something else",
-                       kDamaged);
-    }
-    rest_.remove_prefix(size);
-    return value;
-  }
-  void EndEntry() override {
-    SkipBlanks();
-    if (!rest_.empty()) {
-      throw InputError(path_, Position(),
-                       "is " + Quoted(line_) +
-                           ", which has more numbers than the "
-                           "header says",
-                       kDamaged);
-    }
-  }
-  void EndFile() override {
-    std::string_view line;
-    while (lines_.Next(&line)) {
-      if (line.find_first_not_of(" \t") != std::string_view::npos) {
-        throw InputError(path_, Position(), "is " + Quoted(line) + ", expected the end of the file",
-                         kDamaged);
-      }
-    }
-  }
-  int64_t BytesLeft() const override {
-    return lines_.BytesLeft() + static_cast<int64_t>(rest_.size());
-  }
-  std::string Position() const override {
-    return LinePosition(header_lines_ + lines_.line_number());
-  }
-
- private:
-  void SkipBlanks() { rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t"), rest_.size())); }
-
-  std::string path_;
-  LineReader lines_;
-  long header_lines_;
-  std::string_view line_, rest_;
-};
-
-class BinarySource : public ValueSource {
- public:
-  BinarySource(const FileReader& file, const PlyHeader& header)
-      : file_(file), swap_(header.format == "big"), block_offset_(header.body_offset) {}
-
-  void BeginEntry() override { entry_offset_ = Offset(); }
-  double Next(PlyType type) override {
-    const size_t size = static_cast<size_t>(PlyTypeSize(type));
-    if (end_ - begin_ < size) Refill(size);
-    char bytes[8];
-    std::memcpy(bytes, block_.data() + begin_, size);
-    if (swap_) std::reverse(bytes, bytes + size);
-    begin_ += size;
-    const auto as = [&bytes](auto value) {
-      std::memcpy(&value, bytes, sizeof(value));
-      return static_cast<double>(value);
-    };
-    switch (type) {
-      case PlyType::kInt8:
-        return as(int8_t{});
-      case PlyType::kUint8:
-        return as(uint8_t{});
-      case PlyType::kInt16:
-        return as(int16_t{});
-      case PlyType::kUint16:
-        return as(uint16_t{});
-      case PlyType::kInt32:
-        return as(int32_t{});
-      case PlyType::kUint32:
-        return as(uint32_t{});
-      case PlyType::kFloat:
-        return as(float{});
-      default:
-        return as(double{});
-    }
-  }
-  void EndEntry() override {}
-  void EndFile() override {
-    if (BytesLeft() == 0) return;
-    throw InputError(file_.path(), BytePosition(Offset()),
-                     std::to_string(BytesLeft()) +
-                         " bytes follow the last element, expected the end "
-                         "of the file",
-                     kDamaged);
-  }
-  int64_t BytesLeft() const override { return file_.size() - Offset(); }
-  std::string Position() const override { return BytePosition(entry_offset_); }
-
- private:
-  int64_t Offset() const { return block_offset_ + static_cast<int64_t>(begin_); }
-  void Refill(size_t wanted) {
-    const int64_t offset = Offset();
-    if (BytesLeft() < static_cast<int64_t>(wanted)) {
-      throw InputError(file_.path(), BytePosition(file_.size()), "the file ends within the data",
-                       "The file is cut off: copy it again");
-    }
-    block_ = file_.ReadSome(offset, 1 << 20);
-    block_offset_ = offset;
-    begin_ = 0;
-    end_ = block_.size();
-  }
-
-  const FileReader& file_;
-  bool swap_;
-  std::string block_;
-  size_t begin_ = 0, end_ = 0;
-  int64_t block_offset_ = 0, entry_offset_ = 0;
-};
-
 class PlyParser {
  public:
   // wanted: may be null.
   PlyParser(const FileReader& file, const PlyHeader& header, const PlyOptions& options,
             PlyVertexValues* wanted, PlyVisitor* visitor)
       : file_(file), header_(header), options_(options), wanted_(wanted), visitor_(*visitor) {
-    if (header.format == "ascii") {
-      source_ = std::make_unique<AsciiSource>(file, header);
-    } else {
-      source_ = std::make_unique<BinarySource>(file, header);
-    }
+    source_ = ReadPlyValues(file, header);
   }
 
   void Parse() {
@@ -232,14 +85,7 @@ class PlyParser {
                          "the vertices have no property " + name, kDamaged);
       }
     }
-    const bool has_strips =
-        std::any_of(header_.elements.begin(), header_.elements.end(),
-                    [](const PlyElement& e) { return e.name == "tristrips" && e.count > 0; });
-    if (!HasFaces() && has_strips) {
-      throw InputError(file_.path(), "",
-                       "has its triangles as strips (tristrips), which are not read",
-                       "Write it again with faces, by MeshLab or CloudCompare for example");
-    }
+    TakeStripsForFaces();
     if (!HasFaces() && !options_.clouds) {
       throw InputError(
           file_.path(), "",
@@ -255,6 +101,16 @@ class PlyParser {
     if (vertex_->count > std::numeric_limits<int>::max()) {
       throw InputError(file_.path(), LinePosition(vertex_->line), "says more than 2^31 vertices",
                        "Divide the mesh");
+    }
+  }
+
+  // Old files of scanned models have strips of triangles instead of faces.
+  void TakeStripsForFaces() {
+    if (HasFaces()) return;
+    for (const PlyElement& element : header_.elements) {
+      if (element.name != "tristrips" || element.count == 0) continue;
+      face_ = &element;
+      are_strips_ = true;
     }
   }
 
@@ -392,7 +248,7 @@ class PlyParser {
       for (int p = 0; p < static_cast<int>(face_->properties.size()); ++p) {
         const PlyProperty& property = face_->properties[p];
         if (p == list_) {
-          ReadPolygon(property);
+          are_strips_ ? ReadStrips(property) : ReadPolygon(property);
         } else {
           SkipProperty(property);
         }
@@ -411,19 +267,45 @@ class PlyParser {
     }
     Triangle fan = {0, 0, 0};
     for (double k = 0; k < count; ++k) {
-      const double index = source_->Next(property.type);
-      if (!(index >= 0) || !(index < static_cast<double>(vertex_->count)) ||
-          index != std::floor(index)) {
-        throw InputError(
-            file_.path(), source_->Position(),
-            "a face names a vertex that is none of the " + std::to_string(vertex_->count),
-            kDamaged);
-      }
-      fan[k < 2 ? static_cast<int>(k) : 2] = static_cast<int>(index);
+      fan[k < 2 ? static_cast<int>(k) : 2] = VertexOf(source_->Next(property.type));
       if (k < 2) continue;
-      if (fan[0] != fan[1] && fan[1] != fan[2] && fan[0] != fan[2]) visitor_.Face(fan);
+      Give(fan);
       fan[1] = fan[2];
     }
+  }
+
+  // Every vertex from the third on makes a triangle with the two before it, every second one the
+  // other way round; -1 begins another strip.
+  void ReadStrips(const PlyProperty& property) {
+    const double count = ListCount(property);
+    Triangle last = {0, 0, 0};
+    int64_t length = 0;
+    for (double k = 0; k < count; ++k) {
+      const double index = source_->Next(property.type);
+      if (index == -1) {
+        length = 0;
+        continue;
+      }
+      last = {last[1], last[2], VertexOf(index)};
+      if (++length < 3) continue;
+      const bool is_turned = length % 2 == 0;
+      Give(is_turned ? Triangle{last[1], last[0], last[2]} : last);
+    }
+  }
+
+  int VertexOf(double index) const {
+    if (!(index >= 0) || !(index < static_cast<double>(vertex_->count)) ||
+        index != std::floor(index)) {
+      throw InputError(
+          file_.path(), source_->Position(),
+          "a face names a vertex that is none of the " + std::to_string(vertex_->count), kDamaged);
+    }
+    return static_cast<int>(index);
+  }
+
+  // Unless two corners are one: no surface.
+  void Give(const Triangle& t) const {
+    if (t[0] != t[1] && t[1] != t[2] && t[0] != t[2]) visitor_.Face(t);
   }
 
   const FileReader& file_;
@@ -432,10 +314,11 @@ class PlyParser {
   PlyVertexValues* wanted_;
   PlyVisitor& visitor_;
   PlyFacts facts_;
-  std::unique_ptr<ValueSource> source_;
+  std::unique_ptr<PlyValues> source_;
   const PlyElement* vertex_ = nullptr;
   const PlyElement* face_ = nullptr;
   int coordinate_[3] = {-1, -1, -1};
+  bool are_strips_ = false;  // face_ is an element tristrips
   int list_ = -1, intensity_ = -1;
   Triple color_, normal_;
 };

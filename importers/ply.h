@@ -27,8 +27,9 @@ struct PlyVertexValues {
 };
 
 // Reads ascii and binary files of both byte orders: vertices x, y, z and, if there, intensity
-// (also scalar_intensity, CloudCompare's name), faces of any size as fans of triangles; of clouds
-// the normals nx, ny, nz. Other elements and properties are skipped. The scan is not organised;
+// (also scalar_intensity, CloudCompare's name), faces of any size as fans of triangles, where
+// there are none strips of triangles (tristrips); of clouds the normals nx, ny, nz. Other elements
+// and properties are skipped. The scan is not organised;
 // `up` and station come from our own files' comments, otherwise z and the origin. Throws InputError
 // with line or byte; a cloud without faces is refused, or one of Scan::Kind::kCloud. format:
 // "ascii", "little" or "big" endian; may be null. values: what else is wanted of the vertices; may
@@ -38,7 +39,7 @@ Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* fo
 
 // The same for those who do not hold all of it: what the file says, one after the other.
 struct PlyFacts {
-  size_t num_vertices = 0, num_faces = 0;
+  size_t num_vertices = 0, num_faces = 0;  // faces or lists of strips: 0 = a cloud
   bool has_intensity = false, has_color = false, has_normal = false;
   double color_scale = 255;  // of the colours' type: 1, 255 or 65535 (ColorScale)
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), station = Eigen::Vector3d::Zero();
@@ -55,7 +56,7 @@ class PlyVisitor {
   virtual ~PlyVisitor() = default;
   virtual void Begin(const PlyFacts& facts) = 0;
   virtual void Vertex(const PlyVertex& vertex) = 0;
-  // Each triangle of a fan; its corners are indices of vertices, which may come later.
+  // Each triangle of a fan or strip; its corners are indices of vertices, which may come later.
   virtual void Face(const Triangle& triangle) = 0;
 };
 void VisitPly(const std::string& path, const PlyOptions& options, PlyVisitor* visitor);

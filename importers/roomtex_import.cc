@@ -203,7 +203,9 @@ class Importer {
     for (const auto& [key, value] : total.items()) context_.report[key] = value;
     context_.report["format"] = file_.format;
     context_.report["byte_order"] = file_.byte_order;
-    context_.report["has_colors"] = !file_.scans[0].colors.empty();
+    context_.report["has_colors"] =
+        std::any_of(file_.scans.begin(), file_.scans.end(),
+                    [](const Scan& scan) { return !scan.colors.empty(); });
     context_.report["up"] = {{"axis", file_.up_axis}, {"assumed", file_.scans[0].up_is_assumed}};
     context_.report["bounds"] = {{"min", ToJson(bounds.min)}, {"max", ToJson(bounds.max)}};
     if (each.size() > 1) context_.report["scans"] = each;

@@ -2,19 +2,15 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
 #include <numeric>
 #include <optional>
 #include <string_view>
 
 #include "core/error.h"
 #include "core/frames.h"
-#include "core/input_guard.h"
 #include "core/option_fields.h"
 #include "core/resource_limits.h"
 #include "core/text.h"
-#include "importers/cloud_grid.h"
-#include "importers/doubtful_unit.h"
 #include "importers/e57.h"
 #include "importers/e57_pages.h"
 #include "importers/file_reader.h"
@@ -26,6 +22,7 @@
 #include "importers/ply.h"
 #include "importers/ptx.h"
 #include "importers/rtpi.h"
+#include "importers/scan_finish.h"
 #include "importers/scan_path.h"
 #include "importers/scan_poses.h"
 #include "importers/up_axis.h"
@@ -81,12 +78,27 @@ bool LooksLikePtx(std::string_view bytes) {
   return line.empty() || IsWholeNumber(BeginsWith(line, "-") ? line.substr(1) : line);
 }
 
+// The name of a format in which a scan may lie packed, "" if it is none of these.
+std::string PackedFormat(std::string_view bytes) {
+  static const std::pair<std::string_view, const char*> kMagics[] = {
+      {"PK\x03\x04", "a zip archive"},
+      {"\x1f\x8b", "a gzip file"},
+      {"BZh", "a bzip2 file"},
+      {"\xfd"
+       "7zXZ",
+       "an xz file"},
+      {"7z\xbc\xaf", "a 7z archive"}};
+  for (const auto& [magic, name] : kMagics) {
+    if (BeginsWith(bytes, magic)) return name;
+  }
+  return "";
+}
+
 // The name of a format that users may take for a scan, "" if it is none of these.
 std::string ForeignFormat(std::string_view bytes) {
   static const std::pair<std::string_view, const char*> kMagics[] = {
-      {"PK\x03\x04", "a zip archive"}, {"\x1f\x8b", "a gzip file"},    {"\x89PNG", "a PNG image"},
-      {"\xff\xd8", "a JPEG photo"},    {"glTF", "a glTF model"},       {"OFF", "an OFF mesh"},
-      {"solid ", "an STL mesh"},       {"SQLite format", "a database"}};
+      {"\x89PNG", "a PNG image"}, {"\xff\xd8", "a JPEG photo"}, {"glTF", "a glTF model"},
+      {"OFF", "an OFF mesh"},     {"solid ", "an STL mesh"},    {"SQLite format", "a database"}};
   for (const auto& [magic, name] : kMagics) {
     if (BeginsWith(bytes, magic)) return name;
   }
@@ -134,109 +146,6 @@ ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
   return file;
 }
 
-std::string NameOrFile(const Scan& scan) {
-  return scan.name.empty() ? "the file" : "the scan " + Quoted(scan.name);
-}
-
-void TakeUpAxis(const ScanReaderOptions& options, Scan* scan) {
-  if (options.up_axis == "auto") return;
-  scan->up = UpAxisOf(options.up_axis);
-  scan->up_is_assumed = false;
-}
-
-// A cell of a grid holds one point, though a cloud can have several there (further returns).
-std::string WhatTheGridLacks(const Scan& cloud, const Scan& grid) {
-  const auto measured = [](const Scan& scan) {
-    return static_cast<long>(scan.points.size()) - scan.NumMissing();
-  };
-  const long num_lost = measured(cloud) - measured(grid);
-  if (num_lost == 0) return "";
-  return "; " + std::to_string(num_lost) +
-         (num_lost == 1 ? " point shares its place there with another one and is"
-                        : " points share their places there with others and are") +
-         " left out";
-}
-
-void FindGridAgain(Scan* scan, std::vector<std::string>* notes) {
-  const Eigen::Quaterniond station_from_scan = scan->scan_from_station.rotation.conjugate();
-  std::vector<Eigen::Vector3d> axes = {Eigen::Vector3d::UnitZ()};  // of the station
-  const Eigen::Vector3d up = station_from_scan * scan->up;
-  if (!up.isApprox(axes[0], 1e-6)) axes.push_back(up);
-  if (scan->up_is_assumed) axes.push_back(station_from_scan * Eigen::Vector3d::UnitY());
-  std::optional<Scan> grid;
-  for (size_t i = 0; i < axes.size() && !grid; ++i) {
-    grid = GridFromCloud(*scan, axes[i]);
-    if (grid && scan->up_is_assumed) grid->up = scan->scan_from_station.rotation * axes[i];
-  }
-  if (!grid) return;
-  notes->push_back(NameOrFile(*scan) +
-                   " is a cloud without a grid; its angles from the station show one of " +
-                   std::to_string(grid->num_columns) + " columns x " +
-                   std::to_string(grid->num_rows) + " rows" + WhatTheGridLacks(*scan, *grid));
-  *scan = std::move(*grid);
-}
-
-void FindUpAxisAgain(Scan* scan, std::vector<std::string>* notes) {
-  if (!scan->up_is_assumed) return;
-  // A grid was found about the axis that is up.
-  if (!scan->organised) scan->up = FindUpAxis(*scan);
-  const std::string axis = NameOfUpAxis(scan->up);
-  if (axis == "z" || axis.empty()) return;
-  scan->up_is_assumed = false;
-  notes->push_back("the file does not say which way is up; its " +
-                   std::string(scan->organised ? "grid" : "surface") + " shows that " + axis +
-                   " is (--up_axis says another)");
-}
-
-// Formats that do not say their unit, and scans that are hardly in metres.
-void NoteDoubtfulUnit(const ScanReaderOptions& options, const Scan& scan, ScanFile* file) {
-  const bool is_silent = file->format == "PLY" || file->format == "OBJ" || file->format == "PCD" ||
-                         file->format == "PTX" || file->format == "XYZ" ||
-                         (file->format == "LAS" && !file->unit_is_said);
-  if (!is_silent || !options.units.empty()) return;
-  const std::string unit = LikelierUnit(scan);
-  if (unit.empty()) return;
-  const Bounds bounds = FindBounds(scan);
-  const Eigen::Vector3d size = bounds.max - bounds.min;
-  const auto text = [&size](double factor) {
-    std::string sizes;
-    for (int k = 0; k < 3; ++k) {
-      const double length = size[k] * factor;
-      sizes += (k > 0 ? " x " : "") + Number(length, length < 100 ? 1 : 0);
-    }
-    return sizes + " m";
-  };
-  file->notes.push_back("the file does not say its unit; in metres it is " + text(1) +
-                        " large. If these are " + unit + " (" + text(*MetersPerUnit(unit)) +
-                        "), give --units " + unit);
-}
-
-// Rec. 709, of sRGB values as they are; GreyOf (mesh_scan.h), of colours without an intensity
-// beside them, is Rec. 601. Both stay: a scan that is read again has the intensity that it was
-// aligned by.
-float LumaOf(const std::array<uint8_t, 3>& color) {
-  return 0.2126f * color[0] + 0.7152f * color[1] + 0.0722f * color[2];
-}
-
-// A scanner's camera has not seen what is black.
-void TakeColorsAsIntensity(Scan* scan, std::vector<std::string>* notes) {
-  size_t num_measured = 0, num_colored = 0;
-  for (size_t i = 0; i < scan->colors.size(); ++i) {
-    if (scan->IsMissing(static_cast<int>(i))) continue;
-    ++num_measured;
-    num_colored += LumaOf(scan->colors[i]) > 0;
-  }
-  constexpr double kMostSamples = 0.8;
-  if (num_measured > 0 && num_colored >= kMostSamples * num_measured) {
-    for (size_t i = 0; i < scan->colors.size(); ++i) {
-      if (!scan->IsMissing(static_cast<int>(i))) scan->intensity[i] = LumaOf(scan->colors[i]);
-    }
-    notes->push_back(NameOrFile(*scan) +
-                     " has colours of its own: these, not its intensity, are compared with photos");
-  }
-  CellColors().swap(scan->colors);
-}
-
 // What every scan goes through as soon as it is read.
 class ScanFinish {
  public:
@@ -245,15 +154,7 @@ class ScanFinish {
 
   ScanVisitor Of(ScanFile* file) const {
     return [this, file](std::vector<Scan>* scans) {
-      Scan& scan = scans->back();
-      NoteInput(scan.path, "the scan");
-      TakeUpAxis(options_, &scan);
-      if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file->notes);
-      if (scan.kind() == Scan::Kind::kMesh && scan.station_is_assumed) FindViewpoint(&scan);
-      FindUpAxisAgain(&scan, &file->notes);
-      if (file->up_axis.empty()) file->up_axis = NameOfUpAxis(scan.up);
-      NoteDoubtfulUnit(options_, scan, file);
-      if (options_.colors_as_intensity) TakeColorsAsIntensity(&scan, &file->notes);
+      FinishScan(options_, file, &scans->back());
       if (visit_) visit_(scans);
     };
   }
@@ -319,6 +220,15 @@ ScanFile ReadWith(const std::string& given_path, const ScanReaderOptions& option
     if (reader.size() == 0) throw InputError(path, "", "is empty", kKnownFormats);
     start = reader.ReadSome(0, kLookAt);
     start.erase(0, SizeOfByteOrderMark(start));
+    if (LineEndOf(start) == '\r') std::replace(start.begin(), start.end(), '\r', '\n');
+  }
+  if (BeginsWith(start, "\xff\xfe") || BeginsWith(start, "\xfe\xff")) {
+    throw InputError(path, BytePosition(0), "is text in UTF-16, expected UTF-8",
+                     "Save it as UTF-8 or ASCII, by a text editor for example");
+  }
+  if (const std::string packed = PackedFormat(start); !packed.empty()) {
+    throw InputError(path, BytePosition(0), "is " + packed + ", expected a range scan",
+                     "Unpack it, and give the file that is in it");
   }
   if (LooksLikeE57(start)) return ReadAsE57(parts, options, finish);
   if (!parts.part.empty()) {

@@ -24,6 +24,7 @@ namespace {
 constexpr int64_t kTellColumnsBy = 1 << 18;  // bytes, to tell the columns
 constexpr int64_t kPointsToGuessBy = 1000;   // how many there are in all
 constexpr int64_t kShortestPoint = 6;        // bytes: "0 0 0\n"
+constexpr int64_t kCommasLookedAt = 1000;    // points; further ones have columns as these have
 const char kNotXyz[] = "The file is damaged, or no list of points";
 
 class XyzParser {
@@ -31,6 +32,7 @@ class XyzParser {
   XyzParser(const FileReader& file, const XyzOptions& options)
       : file_(file), options_(options), lines_(file) {
     std::string start = file.ReadSome(0, kTellColumnsBy);
+    if (LineEndOf(start) == '\r') std::replace(start.begin(), start.end(), '\r', '\n');
     if (file.size() > kTellColumnsBy) start.resize(start.rfind('\n') + 1);  // nothing, of one line
     layout_ = FindXyzLayout(start);
   }
@@ -99,6 +101,12 @@ class XyzParser {
     if (words_.size() != columns.count) {
       throw Error(line, std::to_string(columns.count) + " columns as in the lines before");
     }
+    if (num_points_ < kCommasLookedAt && !layout_.decimal_commas && HasCommasInNumbers(line)) {
+      throw InputError(
+          file_.path(), LinePosition(lines_.line_number()),
+          "is " + Quoted(line) + ", where commas stand within numbers, and points as well",
+          "Write all numbers with points, and commas between them or none");
+    }
     const auto number = [&](int column) {
       double value = 0;
       if (!ParseXyzNumber(words_[static_cast<size_t>(column)], layout_.decimal_commas, &value)) {
@@ -126,7 +134,10 @@ class XyzParser {
       if (has_colors_ && columns.intensity < 0) intensity = GreyOf(color);
     }
     const double range = point.norm();
-    if (!std::isfinite(range) || (options_.max_range > 0 && range > options_.max_range)) return;
+    if (!std::isfinite(range) || (options_.max_range > 0 && range > options_.max_range)) {
+      ++scan_.num_left_out;
+      return;
+    }
     scan_.points.push_back(point);
     if (options_.colors && has_colors_ && columns.color[0] >= 0) {
       scan_.colors.push_back(color_scale_.Bytes(color, &scan_.colors));

@@ -52,6 +52,24 @@ Commas CommasOf(std::string_view line, std::vector<std::string_view>* words) {
              : Commas::kBetween;
 }
 
+// With a comma in place of the point, or with commas and a point: "1,5", "5,412,345.25".
+bool IsNumberWithCommas(std::string_view word) {
+  double number = 0;
+  if (word.empty() || word.front() == ',' || word.back() == ',') return false;
+  if (ParseXyzNumber(word, true, &number)) return true;
+  const size_t point = word.find('.');
+  if (point == std::string_view::npos) return false;
+  const std::string_view whole = word.substr(0, point);
+  for (size_t comma = whole.find(','); comma != std::string_view::npos;) {
+    const size_t next = whole.find(',', comma + 1);
+    if (std::min(next, whole.size()) - comma != 4) return false;  // thousands
+    comma = next;
+  }
+  std::string without(word);
+  without.erase(std::remove(without.begin(), without.end(), ','), without.end());
+  return ParseReal(without, &number);
+}
+
 bool FindDecimalCommas(std::string_view start) {
   bool found = false;
   size_t num_lines = 0;
@@ -104,6 +122,13 @@ void SplitWords(std::string_view line, bool decimal_commas, std::vector<std::str
     words->push_back(line.substr(at, end - at));
     at = line.find_first_not_of(between, end);
   }
+}
+
+bool HasCommasInNumbers(std::string_view line) {
+  if (line.find(',') == std::string_view::npos) return false;
+  std::vector<std::string_view> words;
+  SplitWords(line, true, &words);
+  return words.size() >= 3 && std::all_of(words.begin(), words.end(), IsNumberWithCommas);
 }
 
 bool IsXyzComment(std::string_view line) {

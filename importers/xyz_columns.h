@@ -9,6 +9,9 @@ namespace roomtex {
 
 // The words of a line: between blanks, tabs, semicolons and, unless decimal_commas, commas.
 void SplitWords(std::string_view line, bool decimal_commas, std::vector<std::string_view>* words);
+// Whether blanks, tabs or semicolons part three numbers and more, of which some have commas within:
+// such as "1,5 2,5 3.5" and "1,234.5 2,345.6 7.8".
+bool HasCommasInNumbers(std::string_view line);
 // Begins with # or //.
 bool IsXyzComment(std::string_view line);
 // "nan", "inf" and what no double holds are numbers, too: of no point.

@@ -38,6 +38,19 @@ class MapperModels : public MapperCommand {
   }
 };
 
+// The models appear with the report, and so does what is told of them.
+TEST_F(MapperModels, NothingIsSaidOfThoseThatAreNotWritten) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  Simulate(RoomOptions(4));
+  const std::string database = folder_ / "database.db", photos = folder_ / "photos";
+  const CommandResult result =
+      RunCommandLine("roomtex-mapper --database_path " + database + " --image_path " + photos +
+                     " --output_path " + (folder_ / "sparse") + " --report_path /dev/full");
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_FALSE(fs::exists(folder_ / "sparse/0"));
+  EXPECT_EQ(result.out, "");
+}
+
 // Matching puts them into one model, as the same furniture stands in both.
 TEST_F(MapperModels, GivesRoomsThatAreAlikeModelsOfTheirOwn) {
   SimulatedViewsOptions options = RoomOptions(13);

@@ -61,6 +61,18 @@ class PairsCommand : public testing::Test {
                     report_path_ = folder_ / "report.json";
 };
 
+// The pairs appear with the report, and so does what is told of them.
+TEST_F(PairsCommand, SaysNothingOfPairsThatAreNotWritten) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  WriteRooms("a");
+  const CommandResult result =
+      RunCommandLine("roomtex-pairs --database_path " + database_ + " --output_path " + output_ +
+                     " --report_path /dev/full");
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(output_));
+  EXPECT_THAT(result.out, IsEmpty());
+}
+
 TEST_F(PairsCommand, FindsThePairsOfARoomAndNoneAcrossRooms) {
   for (const Schema schema : {Schema::k38, Schema::k41}) {
     std::filesystem::remove(database_);

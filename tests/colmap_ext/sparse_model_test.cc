@@ -106,8 +106,9 @@ TEST(SparseModel, FindsImagesByName) {
 
 TEST(SparseModel, TextMayBeWrittenByHand) {
   const TempFolder folder;
+  // With the byte order mark of an editor of Windows.
   WriteBytes(folder / "cameras.txt",
-             "# cameras\r\n\r\n  1\tPINHOLE 640   480 +500 5e2 320 240 \r\n");
+             "\xEF\xBB\xBF# cameras\r\n\r\n  1\tPINHOLE 640   480 +500 5e2 320 240 \r\n");
   WriteBytes(folder / "images.txt",
              "# images\n\n"
              "4 2 0 0 0 0.5 -1e-3 7 1 a photo with  spaces.jpg  \r\n"
@@ -118,7 +119,7 @@ TEST(SparseModel, TextMayBeWrittenByHand) {
              " 1.5 2.5 -1  3.5 4.5 77\n"
              "\n"
              "1 1 0 0 0 0 0 0 1 the last line is missing.jpg");
-  WriteBytes(folder / "points3D.txt", "\n#\n77 1 2 3 255 0 7 -1 2 1");
+  WriteBytes(folder / "points3D.txt", "\xEF\xBB\xBF\n#\n77 1 2 3 255 0 7 -1 2 1");
   const SparseModel model = ReadSparseModel(folder.path());
   EXPECT_EQ(model.cameras.at(1).params, (std::vector<double>{500, 500, 320, 240}));
   ASSERT_EQ(model.images.size(), 3u);

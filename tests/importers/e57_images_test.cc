@@ -104,6 +104,18 @@ TEST_F(E57Images, PicturesComeOutAsTheyWentIn) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "photos/sparse"));
 }
 
+// A name of 100 bytes and more ends between two letters; what is no UTF-8 is none.
+TEST_F(E57Images, NamesAreCutBetweenLetters) {
+  std::string umlauts;
+  for (int i = 0; i < 60; ++i) umlauts += "\xC3\xA4";
+  Add("x" + umlauts, "visualReference", 8, 6, "");
+  Add("l\xE4 m", "visualReference", 8, 6, "");
+  const E57Photos photos = Extract();
+  ASSERT_THAT(photos.photos, SizeIs(2));
+  EXPECT_EQ(photos.photos[0].file, "x" + umlauts.substr(0, 98) + ".png");
+  EXPECT_EQ(photos.photos[1].file, "l__m.png");
+}
+
 // The standard: x right, y up, looks along -z.
 TEST_F(E57Images, PinholePicturesSeeWhatTheStandardSays) {
   Add("front", "pinhole", 80, 60, PoseXml(kUnturned, {0, 0, 0}), Pinhole(0.02, 0.0005, 40, 29.5));

@@ -114,12 +114,21 @@ TEST_F(Ply, AcceptsAByteOrderMarkAndSigns) {
   EXPECT_EQ(scan.points[1].x(), 1.5);
 }
 
-TEST_F(Ply, StripsOfTrianglesAreNoCloud) {
-  ExpectError(
-      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+// Every second triangle of a strip is turned over, so that all show the same side.
+TEST_F(Ply, ReadsStripsOfTriangles) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
       "property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n"
-      "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
-      "has its triangles as strips (tristrips), which are not read. Write it again with faces");
+      "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n";
+  EXPECT_THAT(
+      Read(header + "9 0 1 2 3 4 -1 2 3 4\n").triangles,
+      ElementsAre(Triangle{0, 1, 2}, Triangle{2, 1, 3}, Triangle{2, 3, 4}, Triangle{2, 3, 4}));
+  // A vertex that stands twice turns the strip and makes no triangle.
+  EXPECT_THAT(Read(header + "5 0 1 1 2 3\n").triangles, ElementsAre(Triangle{1, 2, 3}));
+  ExpectError(header + "3 0 1 5\n", "line 15: a face names a vertex that is none of the 5");
+  ExpectError(header + "3 0 1 -2\n", "line 15: a face names a vertex that is none of the 5");
+  ExpectError(header + "4 0 1 -1 2\n", "no triangle with three measured corners");
+  ExpectError(header + "4 0 1 2\n", "line 15");
 }
 
 TEST_F(Ply, LeavesOutTrianglesAtMissingAndFarVertices) {

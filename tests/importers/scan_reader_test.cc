@@ -215,6 +215,8 @@ TEST_F(ScanReader, SaysWhatAFileIsThatIsNoScan) {
   ExpectError(Write("a", "ASTM-E57xxxx"), "byte 12: the file ends in its header");
   ExpectError(Write("a", "LASFxxxx"), "ends within the header");
   ExpectError(Write("a", "\xff\xd8\xff\xe0"), "a JPEG photo");
+  ExpectError(Write("a.ptx.gz", "\x1f\x8b\x08"),
+              "is a gzip file, expected a range scan. Unpack it, and give the file that is in it");
   ExpectError(Write("a", "12\nhello\n"), "no scan format");
   ExpectError(Write("a", "P9 4 3\n"), "version 1");
   ExpectError(Write("a", "# nothing else\n"), "no scan format");

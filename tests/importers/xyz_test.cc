@@ -84,6 +84,20 @@ TEST_F(Xyz, CommasMayStandForPoints) {
   }
 }
 
+TEST_F(Xyz, CommasWithinNumbersBesidePointsAreRefused) {
+  for (const char* text :
+       {"1,5 2,5 3.5\n", "1,5;2.5;3,5\n", "1,234.56 2,345.67 3.1\n",
+        "500,123.45\t5,400,123.45\t30.1\n", "1 2 3 4 5\n1 2 3 4 5\n1,5 2,5 3.5\n"}) {
+    ExpectError(text, "where commas stand within numbers, and points as well. Write all numbers");
+  }
+  // Commas between numbers, with blanks between groups of them.
+  for (const char* text : {"1.5,2.5,3.5 4.5\n", "1.5 2.5 3.5 4,5,6\n", "1.0,2.0 3.0,4.0 5.0\n",
+                           "1.5 2.5 3.5 255,128,064\n"}) {
+    WriteBytes(folder_ / "points.txt", text);
+    EXPECT_NO_THROW(ReadXyz(folder_ / "points.txt", {})) << text;
+  }
+}
+
 TEST_F(Xyz, NormalsAreNoColours) {
   XyzOptions options;
   options.colors = true;
