@@ -61,7 +61,7 @@ struct Scan {
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();
   bool up_is_assumed = false;  // the file does not say it
   bool is_rtpi = false;
-  // Of an E57 without a grid: its records that hold no measured point, and none of `points`.
+  // Without a grid: what the file has as points but are none, too far or withheld; not in `points`.
   int64_t num_left_out = 0;
   // Among the scans of its file, from 1; those that are left out because they are empty count.
   int number_in_file = 1;

@@ -27,7 +27,6 @@ class RoomBuilder {
   void AddLights();
   void AddPictures();
   void AddFurniture();
-  void AddFewFurniture();  // of a bare room
   void AddDoor();
   void AddDoorway();  // of the wall between two rooms
 
@@ -80,6 +79,8 @@ class RoomBuilder {
   // Centre `from_left` metres along the wall and `z` above the floor.
   void Hang(Wall wall, double from_left, double z, double width, double height,
             const cv::Mat& picture, double thickness = 0.004);
+  void AddPieces();
+  void AddTableWithChairs(const Rigid& at);
   void AddTable(const Rigid& at);
   void AddChair(const Rigid& at, int cushion);
   void AddSofa(const Rigid& at);

@@ -168,6 +168,41 @@ Camera MakeRoomCamera(const SimulatedRoomOptions& options) {
 
 namespace {
 
+// Of a drawn layout: from anywhere in the room, clear of what stands there, towards any other place
+// that is not right before the camera.
+Rigid DrawCamera(const SimulatedRoomOptions& options, const RoomScene& scene,
+                 const Rigid& scene_from_room, int photo) {
+  constexpr double kFromWall = 0.6, kClear = 0.35, kAhead = 1.5;
+  RandomStream random(MixBits(static_cast<uint64_t>(options.layout_seed), 207, photo));
+  const double pitch_share = MakeRoomCamera(options).IsPanorama() ? kLevelShare : 1;
+  Rigid clearest;
+  double most = -1;
+  for (int attempt = 0; attempt < 40; ++attempt) {
+    const Eigen::Vector3d place(random.Uniform(kFromWall, options.width - kFromWall),
+                                random.Uniform(kFromWall, options.depth - kFromWall),
+                                random.Uniform(1.1, 1.75));
+    const Eigen::Vector3d way =
+        Eigen::Vector3d(random.Uniform(0, options.width), random.Uniform(0, options.depth),
+                        random.Uniform(0.4, 2.0)) -
+        place;
+    const double pitch =
+        std::clamp(std::atan2(way.z(), way.head<2>().norm()), RadFromDeg(-25), RadFromDeg(15));
+    const Rigid pose = PoseAt(place, std::atan2(way.y(), way.x()), pitch_share * pitch,
+                              RadFromDeg(random.Uniform(-options.roll_deg, options.roll_deg)));
+    const Eigen::Vector3d here = scene_from_room * place;
+    const Eigen::Vector3d forward = pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    const auto ahead = scene.Cast(here, scene_from_room.rotation * forward);
+    const double clearance = ClearanceAround(scene, here);
+    const bool is_clear = clearance > kClear && (!ahead || ahead->distance > kAhead);
+    if (is_clear) return pose;
+    if (clearance > most) {
+      most = clearance;
+      clearest = pose;
+    }
+  }
+  return clearest;
+}
+
 // In the frame of a room of the scene.
 std::vector<Rigid> PlaceCamerasInRoom(const SimulatedRoomOptions& options, const RoomScene& scene,
                                       const Rigid& scene_from_room) {
@@ -175,6 +210,10 @@ std::vector<Rigid> PlaceCamerasInRoom(const SimulatedRoomOptions& options, const
   const Eigen::Vector2d middle(0.5 * options.width, 0.5 * options.depth);
   const bool level = MakeRoomCamera(options).IsPanorama();
   for (int i = 0; i < options.num_photos; ++i) {
+    if (options.layout_seed >= 0) {
+      poses.push_back(DrawCamera(options, scene, scene_from_room, i));
+      continue;
+    }
     RandomStream random(MixBits(static_cast<uint64_t>(options.random_seed), 201, i));
     const double around = 2 * kPi * (i + random.Uniform(-0.15, 0.15)) / options.num_photos;
     const bool high = i % 2 == 0;
@@ -252,8 +291,13 @@ std::vector<Rigid> PlaceStationsInRoom(const SimulatedRoomOptions& options, cons
   for (int k = 0; k < options.num_stations; ++k) {
     RandomStream random(MixBits(static_cast<uint64_t>(options.random_seed), 202, k));
     const double height = 1.5 + 0.04 * (k % 3);
-    const Eigen::Vector2d preferred(kPreferred[k % 4][0] * options.width + 0.1 * (k / 4),
-                                    kPreferred[k % 4][1] * options.depth - 0.1 * (k / 4));
+    Eigen::Vector2d preferred(kPreferred[k % 4][0] * options.width + 0.1 * (k / 4),
+                              kPreferred[k % 4][1] * options.depth - 0.1 * (k / 4));
+    if (options.layout_seed >= 0) {
+      RandomStream of_layout(MixBits(static_cast<uint64_t>(options.layout_seed), 206, k));
+      preferred << of_layout.Uniform(0.2, 0.8) * options.width,
+          of_layout.Uniform(0.2, 0.8) * options.depth;
+    }
     Eigen::Vector3d place(preferred.x(), preferred.y(), height);
     double best = -std::numeric_limits<double>::infinity();
     for (double x = 0.5; x <= options.width - 0.5; x += 0.2) {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "capture/simulation/room_builder.h"
+#include "capture/simulation/room_layout.h"
 
 namespace roomtex {
 
@@ -263,6 +264,11 @@ void RoomBuilder::AddPlant(double x, double y, double z, double size) {
 }
 
 void RoomBuilder::AddParcels(const Rigid& at) {
+  if (options_.bare) {
+    const int carton = Add(MakePlain(RgbFromSrgb(176, 138, 92)), {0.3f, 0.6f, {0.6f, 0.3f, 0}});
+    Part(at, carton, 0, 0, 0, 0.55, 0.42, 0.38);
+    return;
+  }
   const auto parcel = [&](const Rigid& where, double sx, double sy, double sz) {
     const auto px = [](double metres) { return static_cast<int>(std::lround(1000 * metres)); };
     const int plain = Add(MakePlaster(RgbFromSrgb(176, 138, 92), 0.09f, NextSeed()),
@@ -310,30 +316,60 @@ void RoomBuilder::AddCurtain(double x0, double x1, double y, int surface) {
   }
 }
 
-void RoomBuilder::AddFurniture() {
+void RoomBuilder::AddTableWithChairs(const Rigid& at) {
+  if (options_.bare) {
+    AddTable(at * Placed(0, 0, 0, 7));
+    AddChair(at * Placed(-0.3, -0.62, 0, 10), walnut_);
+    AddChair(at * Placed(0.35, 0.66, 0, 174), walnut_);
+    return;
+  }
   const auto cushion = [&](int red, int green, int blue) {
     return Add(MakePlaid({RgbFromSrgb(red, green, blue), RgbFromSrgb(220, 208, 184),
                           RgbFromSrgb(red / 2, green / 2, blue / 2)},
                          0.03f, NextSeed()),
                {0.6f, 0.2f, {0.5f, 0.2f, 0.2f}});
   };
-  // Floor: the rug under the table.
-  const double table_x = width_ - 1.75, table_y = 1.55;
   const auto rug = AddPictureSurface(DrawRug(2300, 1600, NextSeed()), 2.3, 1.6, 0.1f,
                                      {0.5f, 0.35f, {0.3f, 0.3f, 0.3f}});
-  const Rigid rug_at = Placed(table_x - 0.15, table_y + 0.1, 0, 4);
-  Face(rug_at, rug, {-1.15, 0.8, 0.007}, {2.3, 0, 0}, {0, -1.6, 0});
-  AddTable(Placed(table_x, table_y, 0, 7));
-  AddChair(Placed(table_x - 0.3, table_y - 0.62, 0, 10), cushion(170, 60, 50));
-  AddChair(Placed(table_x + 0.35, table_y + 0.66, 0, 174), cushion(60, 100, 150));
-  AddChair(Placed(table_x + 1.02, table_y - 0.1, 0, 101), cushion(90, 130, 70));
-  AddSofa(Placed(0.02, 0.47 * depth_, 0, -90));
-  AddShelf(Placed(width_ - 0.015, depth_ - 1.15, 0, 90), 1.5);
-  AddSideboard(Placed(width_ - 3.3 > 1.2 ? 1.35 : 0.9, 0.016, 0));
-  AddFloorLamp(0.38, depth_ - 0.4);
-  AddPlant(width_ - 0.42, 0.42, 0, 1.1);
-  AddParcels(Placed(0.95, depth_ - 0.62, 0, 5));
-  if (options_.bare_walls) return;
+  Face(at * Placed(-0.15, 0.1, 0, 4), rug, {-1.15, 0.8, 0.007}, {2.3, 0, 0}, {0, -1.6, 0});
+  AddTable(at * Placed(0, 0, 0, 7));
+  AddChair(at * Placed(-0.3, -0.62, 0, 10), cushion(170, 60, 50));
+  AddChair(at * Placed(0.35, 0.66, 0, 174), cushion(60, 100, 150));
+  AddChair(at * Placed(1.02, -0.1, 0, 101), cushion(90, 130, 70));
+}
+
+void RoomBuilder::AddPieces() {
+  for (const PlacedPiece& placed : LayOut(options_)) {
+    const Vector3d foot = placed.at.translation;
+    switch (placed.piece) {
+      case Piece::kTable:
+        AddTableWithChairs(placed.at);
+        break;
+      case Piece::kSofa:
+        AddSofa(placed.at);
+        break;
+      case Piece::kShelf:
+        AddShelf(placed.at, 1.5);
+        break;
+      case Piece::kSideboard:
+        AddSideboard(placed.at);
+        break;
+      case Piece::kFloorLamp:
+        AddFloorLamp(foot.x(), foot.y());
+        break;
+      case Piece::kPlant:
+        AddPlant(foot.x(), foot.y(), 0, 1.1);
+        break;
+      case Piece::kParcels:
+        AddParcels(placed.at);
+        break;
+    }
+  }
+}
+
+void RoomBuilder::AddFurniture() {
+  AddPieces();
+  if (options_.bare || options_.bare_walls) return;
   // Radiator under the window and curtains beside it.
   for (int rib = 0; rib < 20; ++rib) {
     Box(white_, window_left_ + 0.2 + 0.06 * rib, depth_ - 0.11, 0.14, 0.045, 0.08, 0.55, 2);
@@ -350,17 +386,6 @@ void RoomBuilder::AddFurniture() {
       0.02);
 }
 
-void RoomBuilder::AddFewFurniture() {
-  const double table_x = width_ - 1.75, table_y = 1.55;
-  AddTable(Placed(table_x, table_y, 0, 7));
-  AddChair(Placed(table_x - 0.3, table_y - 0.62, 0, 10), walnut_);
-  AddChair(Placed(table_x + 0.35, table_y + 0.66, 0, 174), walnut_);
-  AddSofa(Placed(0.02, 0.47 * depth_, 0, -90));
-  AddSideboard(Placed(width_ - 3.3 > 1.2 ? 1.55 : 1.1, 0.016, 0));
-  const int carton = Add(MakePlain(RgbFromSrgb(176, 138, 92)), {0.3f, 0.6f, {0.6f, 0.3f, 0}});
-  Part(Placed(1.0, depth_ - 0.62, 0, 5), carton, 0, 0, 0, 0.55, 0.42, 0.38);
-}
-
 namespace {
 
 void FurnishOneRoom(const SimulatedRoomOptions& options, RoomScene* scene) {
@@ -372,12 +397,7 @@ void FurnishOneRoom(const SimulatedRoomOptions& options, RoomScene* scene) {
     builder.AddDoor();
   }
   if (options.furnished && !options.bare_walls) builder.AddPictures();
-  if (!options.furnished) return;
-  if (options.bare) {
-    builder.AddFewFurniture();
-  } else {
-    builder.AddFurniture();
-  }
+  if (options.furnished) builder.AddFurniture();
 }
 
 }  // namespace

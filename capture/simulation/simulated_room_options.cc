@@ -21,6 +21,7 @@ SimulatedRoomOptions SimulatedRoomOptions::SecondRoom() const {
   SimulatedRoomOptions second = *this;
   second.random_seed ^= kOtherSeeds;
   if (furniture_seed >= 0) second.furniture_seed ^= kOtherSeeds;
+  if (layout_seed >= 0) second.layout_seed ^= kOtherSeeds;
   return second;
 }
 
@@ -36,6 +37,11 @@ void SimulatedRoomOptions::DeclareRoom(OptionFields* fields) {
       .Within(3.8, 20, "m: the furniture has to fit in");
   fields->Number("room_height", &height, "height of the room, metres").Within(2.5, 6, "m");
   fields->Bool("furnished", &furnished, "table, shelf, sofa, pictures and so on");
+  fields
+      ->Int("layout_seed", &layout_seed,
+            "0 or more: which furniture there is and where, where photos are taken from and "
+            "scanners stand is drawn by this number; -1: as in all rooms of that size")
+      .AtLeast(-1);
   fields->Bool("bare_walls", &bare_walls,
                "plain walls, floor and ceiling: nothing for features to hold on to");
 }

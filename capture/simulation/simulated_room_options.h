@@ -80,6 +80,8 @@ struct SimulatedRoomOptions {
   // Behind the door, which stands open: turned by 180 degrees, with walls, pictures, scans and
   // photos of its own, as many as the first; further photos are taken on the way through.
   bool second_room = false;
+  // Of furniture, places of photos and scanners; -1 = as in all rooms of that size.
+  int layout_seed = -1;
   int furniture_seed = -1;  // of what is not the room's shell; -1 = random_seed
   // Scans.
   int num_stations = 1;

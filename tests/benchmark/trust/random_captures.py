@@ -19,7 +19,7 @@ LENSES = ["SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"]
 FORMATS = [".rtpi", ".e57", ".ptx", ".ply", ".las", ".pts"]
 
 
-def draw(seed):
+def draw(seed, layouts):
     """The options of roomtex-simulate, and how the user calls roomtex-auto."""
     draws = random.Random(seed)
     chance = draws.random
@@ -53,6 +53,8 @@ def draw(seed):
     told = draws.choice(["lens", "exif", "nothing"])
     if told == "exif":
         options["exif"] = 1
+    if layouts:
+        options["layout_seed"] = seed
     return options, told, draws.random() < 0.5, draws.choice(FORMATS)
 
 
@@ -85,8 +87,8 @@ def scans_of(folder, tools, extension):
     return [path], poses
 
 
-def measure(folder, tools, seed, until):
-    options, told, clicks, extension = draw(seed)
+def measure(folder, tools, seed, until, layouts):
+    options, told, clicks, extension = draw(seed, layouts)
     capture, result = os.path.join(folder, "capture"), os.path.join(folder, "result")
     os.makedirs(folder, exist_ok=True)
     if not os.path.exists(os.path.join(capture, "truth")):
@@ -145,6 +147,7 @@ def main():
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--count", type=int, default=10)
     parser.add_argument("--until", default="")
+    parser.add_argument("--layouts", type=int, default=0, help="1: furniture, places of photos and scanners are drawn, too")
     args = parser.parse_args()
     os.environ["QT_QPA_PLATFORM"] = "offscreen"
     print("| seed | drawn | exit | off, median / worst, mm, photos | said, mm | PSNR, dB | seconds | verdict |")
@@ -152,7 +155,7 @@ def main():
     for seed in range(args.first, args.first + args.count):
         try:
             print(measure(os.path.join(os.path.abspath(args.folder), str(seed)), os.path.abspath(args.bin), seed,
-                          args.until), flush=True)
+                          args.until, args.layouts), flush=True)
         except SystemExit as failure:
             print("| %d | %s |" % (seed, failure), flush=True)
 
