@@ -173,6 +173,27 @@ void ForgetTiffOrientation(std::vector<unsigned char>* bytes) {
   }
 }
 
+// OpenCV rounds them to whole numbers from 0 to 255, so that a photo from 0 to 1 would be black;
+// and what is white in it, nobody says.
+void RefuseRealNumbers(const std::string& path, const std::vector<unsigned char>& bytes) {
+  const bool is_tiff = bytes.size() > 4 && ((bytes[0] == 'I' && bytes[1] == 'I') ||
+                                            (bytes[0] == 'M' && bytes[1] == 'M'));
+  if (!is_tiff) return;
+  SilenceExiv2();
+  try {
+    auto image = OpenExif(path);
+    image->readMetadata();
+    // TIFF 6.0, section 19: 3 = IEEE floating point.
+    const auto format = PositiveNumber(image->exifData(), "Exif.Image.SampleFormat");
+    if (!format || *format != 3) return;
+  } catch (const std::exception&) {
+    return;
+  }
+  throw InputError(path, "",
+                   "is a TIFF of floating-point numbers, which does not say what is white",
+                   "Export it with 8 or 16 bits");
+}
+
 // By the file's header: what is asked for every photo decodes none that cannot be transparent.
 bool MayHaveAlpha(const std::string& path) {
   unsigned char start[26] = {};
@@ -180,8 +201,9 @@ bool MayHaveAlpha(const std::string& path) {
   stream.read(reinterpret_cast<char*>(start), sizeof start);
   const std::string_view bytes(reinterpret_cast<const char*>(start), sizeof start);
   if (bytes.substr(1, 3) == "PNG") {
-    constexpr size_t kColourType = 25;  // ISO 15948, 11.2.2: 4 and 6 have alpha
-    return (start[kColourType] & 4) != 0;
+    // ISO 15948, 11.2.2: 4 and 6 have alpha, colours of a palette (3) may each have theirs.
+    constexpr size_t kColourType = 25;
+    return (start[kColourType] & 4) != 0 || start[kColourType] == 3;
   }
   if (bytes.substr(8, 4) == "WEBP") return true;
   if (bytes.substr(0, 2) != "II" && bytes.substr(0, 2) != "MM") return false;
@@ -201,6 +223,7 @@ cv::Mat DecodePhoto(const std::string& path, int flags) {
   RequireFile(path, "Check --image_path: it is the folder that COLMAP was given");
   NoteInput(path);
   std::vector<unsigned char> bytes = ReadBytes(path);
+  RefuseRealNumbers(path, bytes);
   ForgetTiffOrientation(&bytes);
   const bool is_jpeg = bytes.size() > 2 && bytes[0] == 0xff && bytes[1] == 0xd8;
   if (is_jpeg && !IsWholeJpeg(bytes)) {

@@ -89,6 +89,36 @@ TEST(ReadPhoto, TakesGreyAlphaAndSixteenBits) {
   EXPECT_EQ(ReadPhoto(folder / "deep.png").at<cv::Vec3b>(5, 5), cv::Vec3b(1, 2, 255));
 }
 
+TEST(ReadPhoto, RefusesRealNumbers) {
+  TempFolder folder;
+  // Without the option OpenCV writes logarithms, which have a white.
+  cv::imwrite(folder / "light.tif", cv::Mat(10, 20, CV_32FC3, cv::Scalar(0.2, 0.5, 0.9)),
+              {cv::IMWRITE_TIFF_COMPRESSION, 1});
+  EXPECT_INPUT_ERROR(ReadPhoto(folder / "light.tif"), "floating-point");
+  cv::imwrite(folder / "deep.tif", cv::Mat(10, 20, CV_16UC3, cv::Scalar(51 * 257, 0, 255 * 257)));
+  EXPECT_EQ(ReadPhoto(folder / "deep.tif").at<cv::Vec3b>(5, 5), cv::Vec3b(51, 0, 255));
+}
+
+TEST(ReadTransparency, KnowsThatAColourOfAPaletteMayBeTransparent) {
+  TempFolder folder;
+  // Two pixels of a palette of two colours (red, green, blue: 200 10 20 and 30 40 50), of which the
+  // first is transparent (tRNS).
+  constexpr char kPng[] =
+      "\x89\x50\x4e\x47\x0d\x0a\x1a\x0a\x00\x00\x00\x0d\x49\x48\x44\x52"
+      "\x00\x00\x00\x02\x00\x00\x00\x01\x08\x03\x00\x00\x00\xc3\xfc\x8f"
+      "\xb8\x00\x00\x00\x06\x50\x4c\x54\x45\xc8\x0a\x14\x1e\x28\x32\x4e"
+      "\x25\x8c\x2f\x00\x00\x00\x02\x74\x52\x4e\x53\x00\xff\x5b\x91\x22"
+      "\xb5\x00\x00\x00\x0e\x49\x44\x41\x54\x78\x01\x01\x03\x00\xfc\xff"
+      "\x00\x00\x01\x00\x04\x00\x02\x0b\x21\x8b\x71\x00\x00\x00\x00\x49"
+      "\x45\x4e\x44\xae\x42\x60\x82";
+  WriteBytes(folder / "palette.png", std::string(kPng, sizeof kPng - 1));
+  EXPECT_EQ(ReadPhoto(folder / "palette.png").at<cv::Vec3b>(0, 1), cv::Vec3b(50, 40, 30));
+  const cv::Mat1b transparent = ReadTransparency(folder / "palette.png", PhotoPixels::kAsStored);
+  ASSERT_EQ(transparent.size(), cv::Size(2, 1));
+  EXPECT_GT(transparent(0, 0), 0);
+  EXPECT_EQ(transparent(0, 1), 0);
+}
+
 TEST_F(PhotoFile, BrokenOnesAreRefused) {
   EXPECT_INPUT_ERROR(ReadPhoto(folder_ / "missing.jpg"), "does not exist");
   EXPECT_INPUT_ERROR(ReadPhoto(folder_.path()), "is a folder");
