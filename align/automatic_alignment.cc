@@ -58,10 +58,7 @@ Alignment AlignFromStart(const AlignmentInput& input, const AutomaticAlignment& 
   }
   if (corners.empty()) return alignment;
   const double sigma_px = CornerSigma(corners, input.model, best);
-  const SparseModel& as_aligned = alignment.rolling_shutter ? alignment.rolling_shutter->model
-                                  : alignment.lenses.mended ? *alignment.lenses.mended
-                                                            : input.model;
-  if (!NeedsCorners(alignment, corners, sigma_px, as_aligned)) return alignment;
+  if (!NeedsCorners(alignment, corners, sigma_px, input.model)) return alignment;
   // As picks that are as exact as they turn out to be.
   std::vector<Pick> picks = input.picks;
   for (Pick& corner : corners) {
@@ -93,7 +90,10 @@ bool NeedsCorners(const Alignment& alignment, const std::vector<Pick>& corners, 
       std::max(kHeldByOnePart, kBeyondDisagreement * alignment.disagreement.rms)) {
     return true;
   }
-  return CornerSigma(corners, model, alignment.scan_from_sparse) > kDrawnAway * sigma_px;
+  const SparseModel& as_aligned = alignment.rolling_shutter ? alignment.rolling_shutter->model
+                                  : alignment.lenses.mended ? *alignment.lenses.mended
+                                                            : model;
+  return CornerSigma(corners, as_aligned, alignment.scan_from_sparse) > kDrawnAway * sigma_px;
 }
 
 bool AreHints(const std::vector<Pick>& picks) {

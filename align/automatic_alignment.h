@@ -26,7 +26,8 @@ bool AreHints(const std::vector<Pick>& picks);
 // Whether an alignment has to be held by corners that photos show where the scan has them: the
 // surface leaves something open, or it holds the model by a part of the room alone, without which
 // the fit lies elsewhere; or it drew the model away from where the photos confirmed the start.
-// sigma_px: CornerSigma() there.
+// sigma_px: CornerSigma() there. model: the input's; corners are measured in what was aligned of
+// it, which may have other lenses, or still rows.
 bool NeedsCorners(const Alignment& alignment, const std::vector<Pick>& corners, double sigma_px,
                   const SparseModel& model);
 

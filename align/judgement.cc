@@ -143,7 +143,6 @@ void JudgePlacement(const Placement& placement, const TrustOptions& trust,
   }
 }
 
-// What the similarity leaves open, as numbers.
 // Of the seven numbers of the similarity those that the surface leaves open.
 int NumOpen(const Judgement& judgement, bool has_covariance) {
   const OpenDirections& open = judgement.open;
@@ -151,6 +150,7 @@ int NumOpen(const Judgement& judgement, bool has_covariance) {
   return static_cast<int>(open.slides.size() + open.turns.size()) + (open.scale ? 1 : 0);
 }
 
+// What the similarity leaves open, as numbers.
 void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, const AlignmentFit& fit,
                   const AlignmentOptions& options, Judgement* judgement) {
   const SimilarityFit by_picks =

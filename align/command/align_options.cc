@@ -1,6 +1,7 @@
 #include "align/command/align_options.h"
 
 #include <filesystem>
+#include <system_error>
 
 #include "align/command/align_outputs.h"
 #include "align/geo/geo_output.h"
@@ -11,6 +12,8 @@
 #include "core/near_hint.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/output_set.h"
+#include "core/partial_path.h"
 #include "core/photo_fit.h"
 #include "core/resource_limits.h"
 #include "core/result_names.h"
@@ -107,6 +110,27 @@ void AddMethod(AlignCommandOptions* a, Command* command) {
   command->Add(FieldsOf(&o.mesh));
 }
 
+// What cannot be written is better known before the work than after it. Makes no folder: a command
+// that fails later leaves none.
+void ProbeOutputs(const AlignCommandOptions& a) {
+  namespace fs = std::filesystem;
+  if (!a.planes_path.empty()) const OutputFile planes(a.planes_path);
+  std::error_code error;
+  fs::path folder = fs::absolute(a.output_path, error).lexically_normal();
+  if (fs::exists(fs::symlink_status(folder, error))) {
+    const OutputSet outputs(a.output_path);
+    return;
+  }
+  while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
+  try {
+    const PartialFolder probe(folder.string());
+  } catch (const std::system_error& failure) {
+    throw InputError(a.output_path, "",
+                     "cannot be made a folder (" + failure.code().message() + ")",
+                     "Check the path and that you may write there");
+  }
+}
+
 }  // namespace
 
 void AddOptions(AlignCommandOptions* a, Command* command) {
@@ -175,6 +199,7 @@ void CheckOptions(AlignCommandOptions* options) {
   }
   if (!a.image_path.empty()) RequireFolder(a.image_path, "Check --image_path");
   if (!a.database_path.empty()) RequireFile(a.database_path, "Check --database_path");
+  ProbeOutputs(a);
 }
 
 }  // namespace roomtex

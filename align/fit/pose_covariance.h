@@ -22,14 +22,15 @@ inline constexpr size_t kMaxPosesWithCovariance = 400;
 // adjusted (of cameras that are one lens the same), by camera_id; what a lens leaves open is in the
 // poses', too. Image noise is that of the bundle; what stays unknown of a surface is taken to be
 // the same for all points within half a metre of it, so that thousands of points on a wall do not
-// make it exact. Empty for more than kMaxPosesWithCovariance photos, for a bundle that is not
-// usable, and where something stays open. What the rows' motions leave open is in them for half as
-// many photos.
+// make it exact. Empty for more than max_poses photos, for a bundle that is not
+// usable, and where something stays open. What the rows' motions leave open is in them; for more
+// than half as many photos by what each photo's own adds where all other photos are known.
 struct BundleCovariances {
   PoseCovariances poses;
   std::map<uint32_t, Eigen::MatrixXd> cameras;
 };
 BundleCovariances FindCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
-                                  const PlaneBundleOptions& options);
+                                  const PlaneBundleOptions& options,
+                                  size_t max_poses = kMaxPosesWithCovariance);
 
 }  // namespace roomtex

@@ -132,10 +132,11 @@ PhotoMeasures MeasurePhoto(const PerspectiveViews& views, const SparseImage& ima
   PhotoMeasures result;
   const auto read = views.Read(image, &result.warning);
   if (!read) return result;
-  const ScanView view = setup.look.Look(viewer, image.cam_from_model);
+  ScanView view = setup.look.Look(viewer, image.cam_from_model);
+  const cv::Mat photo = views.Still(image, view, setup.look, *read);
+  views.LeaveOutTransparent(image, &view);
   if (view.valid_share < kMinValidShare) return result;
   result.valid = true;
-  const cv::Mat photo = views.Still(image, view, setup.look, *read);
   MeasureImages(view, photo, setup, options, &result);
   result.shifts = MeasureGradientShifts(view, photo, setup.look.projection, viewer.sample_angle(),
                                         options.gradient);

@@ -10,6 +10,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "align/trust/transparent_parts.h"
 #include "core/camera_model.h"
 #include "core/frames.h"
 #include "core/parallel.h"
@@ -312,9 +313,14 @@ cv::Mat1b ReadPictureOf(const SparseImage& image, const Camera& camera,
   if (scale < 1) cv::resize(grey, grey, {}, scale, scale, cv::INTER_AREA);
   cv::Mat1f values;
   grey.convertTo(values, CV_32F);
+  cv::Mat1b seen(grey.size(), static_cast<uchar>(255));
+  const cv::Mat1b transparent = ReadTransparencyOf(image, camera, image_path);
+  if (!transparent.empty()) {
+    cv::resize(255 - transparent, seen, seen.size(), 0, 0, cv::INTER_AREA);
+    seen = seen == 255;
+  }
   const double px_per_deg = RadFromDeg(1.0) * camera.MeanFocalLength() * grey.cols / camera.width;
-  return LocallyNormalised(values, cv::Mat1b(grey.size(), static_cast<uchar>(255)),
-                           kNormalised * px_per_deg);
+  return LocallyNormalised(values, seen, kNormalised * px_per_deg);
 }
 
 std::vector<std::pair<int, int>> MatchNear(const AppearanceFeatures& photo,

@@ -62,8 +62,14 @@ struct Contrast {
   double high = 0;                                            // 95th percentile
   double busyness = std::numeric_limits<double>::infinity();  // median over that
 
-  explicit Contrast(const cv::Mat1f& gradient) {
-    std::vector<float> values(gradient.begin(), gradient.end());
+  // Where the photo shows something.
+  Contrast(const cv::Mat1f& gradient, const cv::Mat1b& unseen) {
+    std::vector<float> values;
+    for (int y = 0; y < gradient.rows; ++y) {
+      for (int x = 0; x < gradient.cols; ++x) {
+        if (unseen.empty() || !unseen(y, x)) values.push_back(gradient(y, x));
+      }
+    }
     if (values.empty()) return;
     high = Quantile(&values, 0.95);
     if (high > 0) busyness = Quantile(&values, 0.5) / high;
@@ -133,7 +139,7 @@ class PhotoMatcher {
     result.tolerance_deg = DegFromRad(tolerance_ * angle_per_cell_);
     result.turned.resize(options_.turns_deg.size());
     result.moved.resize(options_.moves.size());
-    const Contrast contrast(photo_gradient_);
+    const Contrast contrast(photo_gradient_, view_.unseen);
     const bool clear = contrast.high >= kBlank && contrast.busyness <= kBusy;
     std::vector<Shift> shifts, by_chance;
     for (size_t i = 0; i < patches_.size(); ++i) {

@@ -366,8 +366,9 @@ std::vector<std::string> WriteOverlays(const AlignedPhotos& aligned, const std::
     const auto read = views.Read(image, &problems[i]);
     if (!read) return;
     const ScanView view = viewer.Look(setup.lattice, camera, image.cam_from_model, setup.cell_px);
-    const ScanView corner_view = setup.corners.Look(viewer, image.cam_from_model);
+    ScanView corner_view = setup.corners.Look(viewer, image.cam_from_model);
     const cv::Mat photo = views.Still(image, corner_view, setup.corners, *read);
+    views.LeaveOutTransparent(image, &corner_view);
     const GradientShifts shifts = MeasureGradientShifts(corner_view, photo, setup.projection,
                                                         viewer.sample_angle(), options.gradient);
     std::vector<ScanEdge> edges = grid_edges;

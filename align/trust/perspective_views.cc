@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "align/trust/still_photo.h"
+#include "align/trust/transparent_parts.h"
 #include "core/panorama_faces.h"
 
 namespace roomtex {
@@ -84,6 +85,19 @@ std::optional<cv::Mat> PerspectiveViews::ReadCells(const SparseImage& image, int
   cv::resize((*face)(cv::Rect(0, 0, size.width * cell_px, size.height * cell_px)), cells, size, 0,
              0, cv::INTER_AREA);
   return cells;
+}
+
+void PerspectiveViews::LeaveOutTransparent(const SparseImage& image, ScanView* view) const {
+  const auto face = faces_.find(image.image_id);
+  const SparseImage& photo = face == faces_.end() ? image : *face->second.panorama;
+  cv::Mat transparent =
+      ReadTransparencyOf(photo, photos_.model.cameras.at(photo.camera_id), photos_.image_path);
+  if (transparent.empty()) return;
+  if (face != faces_.end()) {
+    transparent = CutFace(transparent, views_->cameras.at(image.camera_id),
+                          face->second.face_from_panorama) > 0;
+  }
+  roomtex::LeaveOutTransparent(transparent, view);
 }
 
 cv::Mat PerspectiveViews::Still(const SparseImage& image, const ScanView& view,

@@ -36,6 +36,8 @@ class PerspectiveViews {
   // The same in cells, see ReadCellsOf().
   std::optional<cv::Mat> ReadCells(const SparseImage& image, int cell_px,
                                    std::string* warning) const;
+  // Takes out of the view of an image what its photo does not show, being transparent there.
+  void LeaveOutTransparent(const SparseImage& image, ScanView* view) const;
   // Either of them had its rows been read with the middle one; view: the image's, of that camera.
   cv::Mat Still(const SparseImage& image, const ScanView& view, const LookSetup& camera,
                 const cv::Mat& picture) const;

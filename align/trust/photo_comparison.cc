@@ -111,12 +111,14 @@ PhotoComparison ComparePhotosOnScan(const AlignedPhotos& aligned, const ScanView
   ParallelFor(num_threads, 0, static_cast<int>(images.size()), [&](int k) {
     const SparseImage& image = *images[k];
     const LookSetup& camera = cameras.at(image.camera_id);
-    const ScanView view = camera.Look(viewer, image.cam_from_model);
+    light[k].assign(samples.size(), kUnseen);
     std::string ignored;  // MeasureAgreement() says it
     const auto cells = views.ReadCells(image, camera.cell_px, &ignored);
-    light[k] = cells ? LightAt(samples, views.Still(image, view, camera, *cells), view,
-                               camera.projection, image.cam_from_model)
-                     : std::vector<float>(samples.size(), kUnseen);
+    if (!cells) return;
+    ScanView view = camera.Look(viewer, image.cam_from_model);
+    const cv::Mat still = views.Still(image, view, camera, *cells);
+    views.LeaveOutTransparent(image, &view);
+    light[k] = LightAt(samples, still, view, camera.projection, image.cam_from_model);
   });
   MakeEven(&light);
 

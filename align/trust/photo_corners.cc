@@ -27,9 +27,10 @@ PhotoCorners FindPhotoCorners(const AlignedPhotos& aligned, const ScanViewer& vi
     const auto photo = views.Read(image, &ignored);
     if (!photo) return;
     const LookSetup& camera = cameras.at(image.camera_id);
-    const ScanView view = camera.Look(viewer, image.cam_from_model);
-    found[i] = MeasureGradientShifts(view, views.Still(image, view, camera, *photo),
-                                     camera.projection, viewer.sample_angle(), options)
+    ScanView view = camera.Look(viewer, image.cam_from_model);
+    const cv::Mat still = views.Still(image, view, camera, *photo);
+    views.LeaveOutTransparent(image, &view);
+    found[i] = MeasureGradientShifts(view, still, camera.projection, viewer.sample_angle(), options)
                    .shifted_alike;
     for (FittingCorner& corner : found[i]) corner.image_id = image.image_id;
   });

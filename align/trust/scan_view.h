@@ -50,6 +50,8 @@ struct ScanView {
   cv::Mat1f depth;        // metres along the optical axis; 0 where invalid
   cv::Mat1f column, row;  // in the scan's grid; NaN where invalid, or for a mesh without a grid
   cv::Mat1w scan;         // index into the scans
+  cv::Mat1b unseen;  // 255 where the photo itself shows nothing (LeaveOutTransparent()); empty =
+                     // it is opaque
   double valid_share = 0;
 };
 

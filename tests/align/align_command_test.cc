@@ -96,7 +96,6 @@ TEST(AlignCommand, WritesTheAlignedModelTheReportAndTheSimilarity) {
   EXPECT_LT(WorstPoseErrors(*one.room, one.model, written).position, 0.003);
 }
 
-// Placed by the middle rows; what is written are the photos' own keypoints.
 // Moved onto a scan of another shape, a model fits it however far both are from the room.
 TEST(AlignCommand, WhatWasBentOntoTheScanIsNotJudgedByIt) {
   CaseFolder files(MakeCase());
@@ -114,6 +113,7 @@ TEST(AlignCommand, WhatWasBentOntoTheScanIsNotJudgedByIt) {
   EXPECT_THAT(result.err, HasSubstr("differed in shape by 35 mm"));
 }
 
+// Placed by the middle rows; what is written are the photos' own keypoints.
 TEST(AlignCommand, ARollingShutterIsSaid) {
   RowMotions motions;
   const SimulatedCase one = WithRollingShutter(MakeCase(2, 6), 1, &motions);

@@ -327,6 +327,30 @@ TEST(AutomaticAlignment, PhotosHoldWhatOnePartOfTheRoomAloneHolds) {
   EXPECT_TRUE(needs(0.004, 0.001));
 }
 
+// With the lens as told, 3 % long, corners of an alignment that mended it would lie 15 pixels off.
+TEST(AutomaticAlignment, CornersAreMeasuredInTheModelThatWasAligned) {
+  const SimulatedCase& one = MakeCase();
+  SparseModel right = one.model;
+  TransformModel(one.room->ScanFromSparse(), &right);
+  SparseModel told = right;
+  for (auto& [id, camera] : told.cameras) {
+    camera.params[0] *= 1.03;
+    camera.params[1] *= 1.03;
+  }
+  Alignment alignment;
+  alignment.fit.surface.converged = true;
+  alignment.fit.surface.covariance.setIdentity();
+  const double sigma_px = CornerSigma(one.picks, right, Similarity());
+  EXPECT_TRUE(NeedsCorners(alignment, one.picks, sigma_px, told));
+  EXPECT_FALSE(NeedsCorners(alignment, one.picks, sigma_px, right));
+  alignment.lenses.mended = right;
+  EXPECT_FALSE(NeedsCorners(alignment, one.picks, sigma_px, told));
+  alignment.lenses.mended.reset();
+  alignment.rolling_shutter.emplace();
+  alignment.rolling_shutter->model = right;
+  EXPECT_FALSE(NeedsCorners(alignment, one.picks, sigma_px, told));
+}
+
 TEST(AutomaticAlignCommand, PhotosHoldTheHeightThatWallsLeaveOpen) {
   const FolderWithPhotos& folder = FolderWithPhotos::Get();
   SparseModel walls = folder.one.model;

@@ -97,6 +97,58 @@ TEST(MirroredReading, IsFoundWithAnySixPicks) {
   EXPECT_TRUE(Find(one).attempt.says_mirrored);
 }
 
+// Six picks on the floor, which lie on it however the scan is read.
+std::vector<Pick> FloorPicks(const SimulatedCase& one, int photo, unsigned seed) {
+  std::vector<Pick> picks;
+  for (const Pick& pick : AnyPicks(one, photo, 200, seed, false)) {
+    const bool on_floor =
+        std::abs((one.room->ScanFromRoom().Inverse() * pick.x_in_scan).z()) < 0.01;
+    if (on_floor && picks.size() < 6) picks.push_back(pick);
+  }
+  return picks;
+}
+
+// Photos of people and things that were gone when the scan was made, and of the floor: read
+// rightly, too many points are off the surface for their share to speak against the other reading.
+// They float; of those of another room as many lie behind the surface.
+TEST(MirroredReading, IsFoundByPointsThatLieAsInAnotherRoom) {
+  SimulatedCase one = MakeCase();
+  one.model = one.room->MakeSparseModel(8000, 0.7);
+  one.picks = FloorPicks(one, 6, 1);
+  ASSERT_EQ(one.picks.size(), 6u);
+  const Similarity room_from_sparse{
+      one.room->ScanFromSparse().scale,
+      one.room->ScanFromRoom().rotation.conjugate() * one.room->ScanFromSparse().rotation,
+      one.room->ScanFromRoom().Inverse() * one.room->ScanFromSparse().translation};
+  for (auto point = one.model.points.begin(); point != one.model.points.end();) {
+    Eigen::Vector3d& x = point->second.x_in_model;
+    const std::vector<TrackElement>& track = point->second.track;
+    const bool on_floor = std::abs((room_from_sparse * x).z()) < 0.02;
+    if (!on_floor && point->first % 12 != 0) {
+      for (const TrackElement& seen : track) {
+        one.model.images.at(seen.image_id).point3d_ids[seen.point2d_index] = kInvalidPoint3dId;
+      }
+      point = one.model.points.erase(point);
+      continue;
+    }
+    if (!on_floor && point->first % 24 == 0) {
+      const Rigid& pose = one.model.images.at(track[0].image_id).cam_from_model;
+      x += 0.3 / room_from_sparse.scale * (pose.TargetOriginInSource() - x).normalized();
+    }
+    ++point;
+  }
+  one.scans = MirrorScans(one.scans);
+  const Found found = Find(one);
+  ASSERT_TRUE(found.attempt.alignment) << found.attempt.refusal;
+  ASSERT_TRUE(found.reading.attempt.alignment) << found.reading.attempt.refusal;
+  const Placement &as_read = found.attempt.alignment->placement,
+                  &mirrored = found.reading.attempt.alignment->placement;
+  EXPECT_GT(1 - mirrored.SurfaceShare(), 0.5 * (1 - as_read.SurfaceShare()));
+  EXPECT_EQ(found.reading.kind, Kind::kScan);
+  EXPECT_TRUE(found.reading.attempt.trusted());
+  EXPECT_THAT(found.reading.evidence, testing::HasSubstr("lie as in another room, as it is"));
+}
+
 TEST(MirroredReading, PicksOfAnotherPhotoAreNoMirroredScan) {
   SimulatedCase one = MakeCase();
   const std::string right = one.picks[0].image_name;

@@ -379,14 +379,44 @@ TEST(PlaneBundle, TheFixedBetaOfTheThesisCanBeUsed) {
   }
 }
 
+// Every fourth point that photo 5 sees keeps one more photo.
+void LeavePointsToPhoto5(SparseModel* model) {
+  for (auto& [id, point] : model->points) {
+    const bool is_seen =
+        std::any_of(point.track.begin(), point.track.end(),
+                    [](const TrackElement& element) { return element.image_id == 5; });
+    if (!is_seen || id % 4 != 0) continue;
+    std::stable_partition(point.track.begin(), point.track.end(),
+                          [](const TrackElement& element) { return element.image_id == 5; });
+    for (size_t i = 2; i < point.track.size(); ++i) {
+      const TrackElement& element = point.track[i];
+      model->images.at(element.image_id).point3d_ids[element.point2d_index] = kInvalidPoint3dId;
+    }
+    if (point.track.size() > 2) point.track.resize(2);
+  }
+}
+
 TEST(PlaneBundle, APhotoThatStandsElsewhereThanItsPointsWantItIsPutBackAndItsCostNotCompared) {
   const Reconstruction& one = StraightRoom();
   SparseModel start = OnSurface(one.room, one.model);
+  LeavePointsToPhoto5(&start);
   start.images.at(5).cam_from_model.translation.x() += 0.25;
   const PlaneBundle bundle = AdjustToSurface(one.room.Input(start), PlaneBundleOptions());
   ASSERT_TRUE(bundle.usable) << bundle.reason;
   EXPECT_THAT(bundle.ran_away, testing::ElementsAre(5));
   EXPECT_THAT(bundle.idle_images, testing::ElementsAre(5));
+  // With its pose its points follow the similarity, also those that were moved before it ran away.
+  int num_own = 0;
+  for (const auto& [id, point] : bundle.model.points) {
+    const auto num_seen =
+        std::count_if(point.track.begin(), point.track.end(),
+                      [](const TrackElement& element) { return element.image_id != 5; });
+    if (num_seen >= 2) continue;
+    ++num_own;
+    EXPECT_THAT(point.x_in_model,
+                IsNearMatrix(bundle.adjusted_from_input * start.points.at(id).x_in_model, 1e-9));
+  }
+  EXPECT_GT(num_own, 20);
   const PlaneBundle right =
       AdjustToSurface(one.room.Input(OnSurface(one.room, one.model)), PlaneBundleOptions());
   ASSERT_TRUE(right.usable) << right.reason;

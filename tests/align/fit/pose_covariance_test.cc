@@ -121,6 +121,36 @@ TEST(PoseCovariance, GrowsWithTheSquareOfTheNoise) {
   }
 }
 
+// Of many photos the matrix cannot hold the motions of their rows: each photo's own stands for
+// them.
+TEST(PoseCovariance, OfManyPhotosKnowsThatTheirRowsMove) {
+  const Reconstruction& one = StraightRoom();
+  PlaneBundleInput input = one.room.Input(one.model);
+  for (const auto& [id, image] : one.model.images) input.row_motions[id] = RowMotion();
+  const PlaneBundle bundle = AdjustToSurface(input, {});
+  const size_t num_photos = one.model.images.size();
+  const PoseCovariances exact = FindCovariances(input, bundle, {}, 2 * num_photos).poses,
+                        of_many = FindCovariances(input, bundle, {}, num_photos).poses;
+  input.row_motions.clear();
+  const PoseCovariances still = FindCovariances(input, bundle, {}).poses;
+  ASSERT_EQ(of_many.size(), num_photos);
+  std::vector<double> positions, rotations, still_positions;
+  for (const auto& [id, covariance] : exact) {
+    const auto ratio = [&](const PoseCovariances& other, int corner) {
+      return std::sqrt(other.at(id).block<3, 3>(corner, corner).trace() /
+                       covariance.block<3, 3>(corner, corner).trace());
+    };
+    positions.push_back(ratio(of_many, 3));
+    rotations.push_back(ratio(of_many, 0));
+    still_positions.push_back(ratio(still, 3));
+  }
+  EXPECT_LT(SpreadOf(still_positions).median, 0.75);
+  for (const std::vector<double>& ratios : {positions, rotations}) {
+    EXPECT_GT(*std::min_element(ratios.begin(), ratios.end()), 0.95);
+    EXPECT_LT(SpreadOf(ratios).median, 1.3);
+  }
+}
+
 TEST(PoseCovariance, IsEmptyForABundleThatIsNotUsed) {
   const Reconstruction& one = StraightRoom();
   EXPECT_TRUE(FindCovariances(one.room.Input(one.model), PlaneBundle(), {}).poses.empty());
