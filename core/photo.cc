@@ -353,22 +353,18 @@ ExposureData ReadExposureData(const std::string& path) {
   return data;
 }
 
-void WriteExposureData(const std::string& path, const ExposureData& exposure) {
+namespace {
+
+constexpr double kFilmDiagonal = 43.2666;  // millimetres, of 36 x 24
+
+// change: what it does to the file's EXIF.
+template <typename Change>
+void ChangeExif(const std::string& path, const Change& change) {
   SilenceExiv2();
   try {
     auto image = OpenExif(path);
     image->readMetadata();
-    Exiv2::ExifData& exif = image->exifData();
-    if (exposure.exposure_time) {
-      exif["Exif.Photo.ExposureTime"] = RationalOf(*exposure.exposure_time);
-    }
-    if (exposure.f_number) exif["Exif.Photo.FNumber"] = RationalOf(*exposure.f_number);
-    if (exposure.iso) {
-      exif["Exif.Photo.ISOSpeedRatings"] =
-          static_cast<uint16_t>(std::lround(std::clamp(*exposure.iso, 0.0, 65535.0)));
-    }
-    if (!exposure.camera.empty()) exif["Exif.Image.Model"] = exposure.camera;
-    if (!exposure.date_time.empty()) exif["Exif.Photo.DateTimeOriginal"] = exposure.date_time;
+    change(&image->exifData());
     image->writeMetadata();
   } catch (const std::exception& error) {
     throw InputError(path, "", std::string("EXIF cannot be written (") + error.what() + ")",
@@ -376,11 +372,36 @@ void WriteExposureData(const std::string& path, const ExposureData& exposure) {
   }
 }
 
+}  // namespace
+
+void WriteExposureData(const std::string& path, const ExposureData& exposure) {
+  ChangeExif(path, [&exposure](Exiv2::ExifData* exif) {
+    const auto set = [exif](const char* key, const auto& value) { (*exif)[key] = value; };
+    if (exposure.exposure_time) {
+      set("Exif.Photo.ExposureTime", RationalOf(*exposure.exposure_time));
+    }
+    if (exposure.f_number) set("Exif.Photo.FNumber", RationalOf(*exposure.f_number));
+    if (exposure.iso) {
+      set("Exif.Photo.ISOSpeedRatings",
+          static_cast<uint16_t>(std::lround(std::clamp(*exposure.iso, 0.0, 65535.0))));
+    }
+    if (!exposure.camera.empty()) set("Exif.Image.Model", exposure.camera);
+    if (!exposure.date_time.empty()) set("Exif.Photo.DateTimeOriginal", exposure.date_time);
+  });
+}
+
+void WriteFocalLength(const std::string& path, double focal_length, std::array<int, 2> size) {
+  const double on_film = kFilmDiagonal * focal_length / std::hypot(size[0], size[1]);
+  ChangeExif(path, [on_film](Exiv2::ExifData* exif) {
+    (*exif)["Exif.Photo.FocalLengthIn35mmFilm"] =
+        static_cast<uint16_t>(std::lround(std::clamp(on_film, 1.0, 65535.0)));
+  });
+}
+
 std::optional<double> ReadFocalLength(const std::string& path) {
   SilenceExiv2();
   const auto [width, height] = ReadPhotoSize(path);
   if (width == 0) return std::nullopt;
-  constexpr double kFilmDiagonal = 43.2666;  // millimetres, of 36 x 24
   std::optional<double> focal;
   try {
     const auto image = OpenExif(path);

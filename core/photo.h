@@ -65,6 +65,9 @@ struct LensData {
 };
 // Missing or broken EXIF is no error: fields stay empty.
 LensData ReadLensData(const std::string& path);
+// What 35 mm film would need for the same view, by the diagonal as CIPA DCG-001 has it, to whole
+// millimetres. focal_length and size in pixels. Throws InputError, as WriteExposureData().
+void WriteFocalLength(const std::string& path, double focal_length, std::array<int, 2> size);
 
 // Where the camera's satellite receiver believed to be (EXIF GPS).
 struct GpsData {

@@ -96,6 +96,10 @@ void WritePhoto(const SimulatedRoom& room, int photo, int seconds, const std::st
     exposure.date_time = DateTime(seconds);
     WriteExposureData(file.partial_path(), exposure);
   }
+  const Camera& camera = room.TrueCamera(photo);
+  if (room.options().exif_lens && !camera.IsPanorama()) {
+    WriteFocalLength(file.partial_path(), camera.MeanFocalLength(), {camera.width, camera.height});
+  }
   file.Commit();
 }
 

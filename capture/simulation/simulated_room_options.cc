@@ -116,6 +116,8 @@ void SimulatedRoomOptions::DeclareLight(OptionFields* fields) {
                "exposures vary by up to plus or minus this, in thirds of an EV")
       .Within(0, 4);
   fields->Bool("exif", &exif, "write exposure time, aperture and ISO into the photos");
+  fields->Bool("exif_lens", &exif_lens,
+               "also the focal length on 35 mm film, to whole millimetres, as phones do");
   fields
       ->Number("photo_noise", &photo_noise,
                "noise of the photos, standard deviation in grey levels of 255")

@@ -57,6 +57,7 @@ struct SimulatedRoomOptions {
   bool distortion = true;
   double exposure_range_ev = 1.0;  // exposure steps within +- this, in thirds of an EV
   bool exif = true;                // exposure time, aperture, ISO
+  bool exif_lens = false;          // and the focal length on 35 mm film, to whole millimetres
   double photo_noise = 1.5;        // grey levels (of 255), standard deviation
   double blur_px = 0.0;            // Gaussian sigma
   double motion_px = 0.0;          // that the camera moves while it is exposed

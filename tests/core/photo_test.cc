@@ -189,6 +189,15 @@ TEST_F(PhotoFile, ExposureDataGoesRoundAndKeepsThePicture) {
   EXPECT_EQ(cv::norm(before, ReadPhoto(path_), cv::NORM_INF), 0);
 }
 
+TEST_F(PhotoFile, FocalLengthGoesRoundToAMillimetreOfFilm) {
+  WriteExposureData(path_, {0.02, 5.6, 400, "Canon EOS 20D", ""});
+  WriteFocalLength(path_, 60, {64, 48});
+  // 80 pixels of diagonal are 43.27 mm of film: 32.45 mm, which are noted as 32.
+  EXPECT_EQ(ReadLensData(path_).focal_length_on_film_mm.value_or(0), 32);
+  EXPECT_NEAR(ReadFocalLength(path_).value_or(0), 32 / 43.2666 * 80, 1e-3);
+  EXPECT_EQ(ReadExposureData(path_).iso.value_or(0), 400);
+}
+
 TEST_F(PhotoFile, ExposureTimeHasTheTypeThatExifDemands) {
   WriteExposureData(path_, {0.02, 5.6, 400, "", ""});
   auto image = Exiv2::ImageFactory::open(path_);

@@ -49,10 +49,9 @@ def draw(seed, layouts):
         options.update(depth_camera=1, num_stations=1, scan_columns=800, scan_rows=340, range_noise=0.002)
     elif kind < 0.4:
         options.update(bend=0.003, azimuth_drift_deg=0.2)
-    # The EXIF of a simulated photo says nothing of the lens: "exif" and "nothing" differ by the exposures alone.
     told = draws.choice(["lens", "exif", "nothing"])
     if told == "exif":
-        options["exif"] = 1
+        options.update(exif=1, exif_lens=1)
     if layouts:
         options["layout_seed"] = seed
     return options, told, draws.random() < 0.5, draws.choice(FORMATS)
@@ -106,7 +105,7 @@ def measure(folder, tools, seed, until, layouts):
     seconds = time.time() - start
     drawn = "%d photos %dx%d %s, %s, %s, %s" % (
         options["num_photos"], options["photo_width"], options["photo_height"], options["camera_model"],
-        "told" if told == "lens" else "not told", "clicks" if clicks else "no clicks",
+        {"lens": "told", "exif": "by EXIF", "nothing": "not told"}[told], "clicks" if clicks else "no clicks",
         "depth camera" if "depth_camera" in options else "laser x %d" % options["num_stations"])
     drawn += "".join(", " + word for word in ("bend", "bare_walls", "rolling_shutter_ms", "motion_px") if word in options)
     drawn += ", strangers" if options["strangers"] else ""

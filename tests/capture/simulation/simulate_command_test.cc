@@ -137,6 +137,24 @@ TEST(CaptureFolder, LeavesExifOutWhenAsked) {
   EXPECT_FALSE(ReadExposureData(folder / "capture/photos/photo_000.jpg").exposure_time.has_value());
 }
 
+TEST(CaptureFolder, NotesTheFocalLengthWhenAsked) {
+  const TempFolder folder;
+  SimulatedRoomOptions options = SmallRoom();
+  options.num_photos = 2;
+  options.zoomed = 0.5;
+  Progress progress(true);
+  const SimulatedRoom room(options);
+  WriteCapture(room, folder / "said_nothing", &progress);
+  EXPECT_FALSE(ReadFocalLength(folder / "said_nothing/photos/photo_000.jpg").has_value());
+  options.exif_lens = true;
+  WriteCapture(SimulatedRoom(options), folder / "capture", &progress);
+  for (int photo = 0; photo < 2; ++photo) {
+    const auto noted = ReadFocalLength(folder / "capture/photos/" + room.PhotoName(photo));
+    // A millimetre of film is 3 % of such lenses.
+    EXPECT_NEAR(noted.value_or(0) / room.TrueCamera(photo).MeanFocalLength(), 1, 0.02);
+  }
+}
+
 TEST(SimulateCommand, WritesTheSameBytesForTheSameSeed) {
   const TempFolder folder;
   const CommandResult first =
