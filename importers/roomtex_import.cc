@@ -25,6 +25,7 @@
 #include "importers/ply.h"
 #include "importers/ptx.h"
 #include "importers/rtpi.h"
+#include "importers/scan_check.h"
 #include "importers/scan_path.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_writer.h"
@@ -35,16 +36,23 @@ namespace roomtex {
 namespace {
 
 struct ImportOptions {
-  std::string input_path;
+  std::vector<std::string> input_paths;
   std::vector<std::string> output_paths;
+  std::string scan_poses;   // of a look at scans
   std::string images_path;  // of an E57: folder for its photos
   bool cut_panoramas = false, image_picks = false;
   ScanReaderOptions reader;
   ScanMeshOptions mesh;
   LasWriterOptions las;
   FaceOptions faces;  // of panoramas
+
+  // Nothing is to be made: only what the scans are is asked for.
+  bool IsLook() const { return output_paths.empty() && images_path.empty(); }
+  // The only one, unless this is a look.
+  const std::string& input_path() const { return input_paths[0]; }
 };
 
+// And the options that say how the scan is read and written.
 void CheckOutputs(const ImportOptions& options) {
   std::vector<std::string> problems;
   std::string known;
@@ -66,7 +74,7 @@ void CheckOutputs(const ImportOptions& options) {
 
 // RTPI to RTPI keeps every sample as it stands, also those that no cell of the grid has.
 void CopyRtpi(const ImportOptions& options, const std::string& output_path) {
-  RtpiFile file = ReadRtpi(options.input_path);
+  RtpiFile file = ReadRtpi(options.input_path());
   file.header.version = 3;
   if (!options.reader.units.empty()) {
     file.header.units = options.reader.units;
@@ -95,7 +103,7 @@ class Importer {
     CheckOutputs(options_);
     context_.progress.Stage("read scan");
     const SampleWork work("converting", kImportBytesPerSample);
-    file_ = ReadScanFile(options_.input_path, options_.reader);
+    file_ = ReadScanFile(options_.input_path(), options_.reader);
     for (const std::string& note : file_.notes) context_.Warn(note);
     CheckGrid();
     NoteLostSystem();
@@ -125,7 +133,7 @@ class Importer {
       const std::string extension = ScanWriterExtension(path);
       if (CanHold(extension, scan.kind())) continue;
       throw InputError(
-          options_.input_path, "",
+          options_.input_path(), "",
           std::string(scan.kind() == Scan::Kind::kCloud ? "is a cloud" : "is a mesh") +
               " without a grid, which cannot be written as " + path,
           "Write a .ply or .las, or give the scan with its grid (RTPI, PTX, E57 or organised PCD)");
@@ -217,7 +225,7 @@ class Importer {
   }
 
   std::string Summary() const {
-    std::string text = options_.input_path + ": " + file_.format + ", ";
+    std::string text = options_.input_path() + ": " + file_.format + ", ";
     if (file_.scans.size() > 1) text += std::to_string(file_.scans.size()) + " scans, ";
     const Json& keys = context_.report.keys();
     if (file_.scans.front().organised) {
@@ -242,18 +250,18 @@ void CutPanoramasOf(const ImportOptions& options, const Command::Context& contex
     throw UsageError("Of panoramas one --output_path is made: the folder for their faces.");
   }
   if (!options.images_path.empty()) {
-    throw UsageError("--images_path is for the photos of an E57, and " + options.input_path +
+    throw UsageError("--images_path is for the photos of an E57, and " + options.input_path() +
                      " are panoramas: their faces go to --output_path.");
   }
   const std::string& folder = options.output_paths[0];
-  const fs::path input = options.input_path;
+  const fs::path input = options.input_path();
   std::error_code none_yet;
   if (fs::equivalent(folder, fs::is_directory(input) ? input : input.parent_path(), none_yet)) {
     throw UsageError("--output_path " + folder +
                      " is the folder of the panoramas: give another one for their faces.");
   }
   const std::vector<CutPanorama> panoramas = CutPanoramas(
-      options.input_path, folder, options.faces, context.options.num_threads, &context.progress);
+      options.input_path(), folder, options.faces, context.options.num_threads, &context.progress);
   context.progress.Finish();
   context.report["num_panoramas"] = panoramas.size();
   context.report["faces_per_panorama"] = panoramas[0].faces.size();
@@ -308,13 +316,13 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
   images.cut_panoramas = options.cut_panoramas;
   images.faces = options.faces;
   const auto outputs = std::make_shared<OutputSet>(options.images_path);
-  const E57Photos photos = ExtractE57Images(SplitScanPath(options.input_path).file,
+  const E57Photos photos = ExtractE57Images(SplitScanPath(options.input_path()).file,
                                             outputs->aside(), images, &context.progress);
   RequireNoOtherPhotos(photos, *outputs);
   context.progress.Finish();
   for (const std::string& note : photos.notes) context.Warn(note);
   if (options.image_picks) {
-    const ScanFile scans = ReadScanFile(options.input_path, options.reader);
+    const ScanFile scans = ReadScanFile(options.input_path(), options.reader);
     const std::vector<PhotoPick> picks = PicksOfPosedPhotos(photos.posed, scans.scans);
     if (picks.empty()) {
       context.Warn("no picks: no photo with a pose shows six places of the scans");
@@ -335,17 +343,62 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
               std::to_string(photos.posed.size()) + " with a pose\n");
 }
 
-void RunImport(const ImportOptions& options, const Command::Context& context) {
-  ThrowIfProblems(options.faces.Problems());
-  if (options.output_paths.empty() && options.images_path.empty()) {
-    throw UsageError("--output_path is missing: what is to be written?");
+// Says what the scans are, and writes nothing.
+void LookAtScans(const ImportOptions& options, const Command::Context& context) {
+  const std::vector<std::string>& paths = options.input_paths;
+  for (const std::string& path : paths) {
+    if (std::count(paths.begin(), paths.end(), path) > 1) {
+      throw UsageError("--input_path " + path + " is given twice");
+    }
+    if (!IsPanoramaInput(path)) continue;
+    std::error_code none;
+    if (fs::is_directory(path, none)) {
+      throw UsageError("--output_path is missing: the folder for the faces of the panoramas in " +
+                       path);
+    }
+    context.progress.Note("of a panorama faces are made, with --output_path, the folder for them");
   }
+  CheckOutputs(options);
+  context.progress.Stage("read scan", static_cast<int>(paths.size()));
+  const std::vector<CheckedFile> files =
+      CheckScans(paths, options.scan_poses, options.reader, &context.progress);
+  context.progress.Finish();
+  for (const CheckedFile& file : files) {
+    for (const std::string& note : file.notes) {
+      context.Warn(paths.size() > 1 ? file.path + ": " + note : note);
+    }
+  }
+  const Json keys = ReportKeys(files);
+  for (const auto& [key, value] : keys.items()) context.report[key] = value;
+  AnswerAtEnd(LinesOn(files));
+}
+
+void CheckUsage(const ImportOptions& options) {
+  ThrowIfProblems(options.faces.Problems());
   if (options.images_path.empty() && (options.image_picks || options.cut_panoramas)) {
     throw UsageError(std::string(options.image_picks ? "--E57.picks" : "--E57.cut_panoramas") +
                      " is for the photos of an E57: give --images_path, the folder for them.");
   }
+  if (options.IsLook()) return;
+  if (options.input_paths.size() > 1) {
+    throw UsageError("--input_path is given " + std::to_string(options.input_paths.size()) +
+                     " times: several are only looked at, without --output_path and --images_path");
+  }
+  if (!options.scan_poses.empty()) {
+    throw UsageError(
+        "--scan_poses is only looked at together with its scans, without --output_path and "
+        "--images_path");
+  }
+}
+
+void RunImport(const ImportOptions& options, const Command::Context& context) {
+  CheckUsage(options);
   for (const char* key : kScanKeys) context.report[key] = nullptr;
-  if (IsPanoramaInput(options.input_path)) {
+  if (options.IsLook()) {
+    LookAtScans(options, context);
+    return;
+  }
+  if (IsPanoramaInput(options.input_path())) {
     CutPanoramasOf(options, context);
     return;
   }
@@ -364,32 +417,37 @@ int main(int argc, char** argv) {
   Command command(
       "roomtex-import",
       "Reads a range scan (RTPI, PTX, E57, PCD, PLY, LAS, text; meshes) and writes it as mesh, "
-      "cloud, intensity image or scan. The content of the input decides its format, "
-      "the extension of an output its own.",
+      "cloud, intensity image or scan; without an output it says what the scan is. The content of "
+      "the input decides its format, the extension of an output its own.",
       "roomtex-import --input_path room.rtpi --output_path room.ply --output_path room.png");
-  command.AddInputPath(
-      "input_path", &options.input_path,
+  command.AddInputPaths(
+      "input_path", &options.input_paths,
       "The scan. A PTX or E57 may hold several: .pcd, .png and .rtpi outputs are then written one "
       "per scan as NAME_1, NAME_2 ..., the others hold all of them. "
       "site.e57#NAME or site.e57#2 is one scan of an E57. Or a "
       "panorama (.jpg, .png, .tif; equirectangular), or a folder of them, to be "
-      "cut into faces for COLMAP up to 4.0, which knows no panoramas. " +
+      "cut into faces for COLMAP up to 4.0, which knows no panoramas. Several are only looked at, "
+      "without --output_path and --images_path. " +
           roomtex::BytesPerSampleHelp(roomtex::kImportBytesPerSample));
   command.AddOutputPaths(
       "output_path", &options.output_paths,
-      "Required, unless --images_path is given. What to write: .ply triangle mesh, .pcd organised "
-      "cloud, .png intensity "
-      "image, .rtpi (RTPI 3.0), .ptx, .e57, or points: .las, .xyz, .pts, .csv. Colours of the scan "
-      "itself go where the format holds them (all but .png and .rtpi). Of panoramas: the folder "
-      "for their "
-      "faces, panoramas.json (which face is which part of which panorama) and "
-      "camera_options.txt (for colmap feature_extractor).",
+      "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity image, .rtpi (RTPI "
+      "3.0), .ptx, .e57, or points: .las, .xyz, .pts, .csv. Colours of the scan itself go where "
+      "the "
+      "format holds them (all but .png and .rtpi). Of panoramas, where it is required: the folder "
+      "for their faces, panoramas.json (which face is which part of which panorama) and "
+      "camera_options.txt (for colmap feature_extractor). Without it, and without --images_path, "
+      "the scan is only looked at: a line says what it is, and whether it has a pose.",
       Command::Kind::kOptional);
   command.AddOutputPath("images_path", &options.images_path,
                         "E57: folder for its photos, written as they are. Those with a pose also "
                         "become a COLMAP model in its folder sparse, in the frame of the scans: "
                         "what roomtex-texture takes as --input_path.",
                         Command::Kind::kOptional);
+  command.AddInputPath("scan_poses", &options.scan_poses,
+                       "Without --output_path: the poses of the scans, which are looked at as "
+                       "roomtex-align reads them. Several scans need a pose each.",
+                       Command::Kind::kOptional);
   command.AddBool(
       "E57.cut_panoramas", &options.cut_panoramas,
       "With --images_path: panoramas as faces (--Faces.*) of perspective cameras in the "

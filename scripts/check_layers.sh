@@ -36,7 +36,7 @@ declare -A allowed=(
   [building/window]="$below building"
   [dense]="$below"
 
-  [workflow]="core importers"
+  [workflow]="core"
 
   [capture]="$below capture/pattern capture/simulation"
   [capture/pattern]="$below"

@@ -2,14 +2,18 @@
 // What no step reads before the last ones do. Looked at when a run begins, so that what is wrong
 // there is said before the hours that features and matches take.
 
-#include "workflow/auto_options.h"
+#include <string>
+
+#include "workflow/chain.h"
 
 namespace roomtex {
 
-// Reads the scans as roomtex-align will, and the picks' table. Throws InputError or UsageError as
-// it would. No more than one scan is held at a time. Progress is for the caller to tell.
-void RequireReadableScans(const AutoOptions& options);
-// Columns and numbers; which photos they name is known when there is a model.
+// Has roomtex-import read the scans as roomtex-align will, one after the other. What it prints and
+// reports lies in log/scans.log and .json. Throws InputError or UsageError with what it says, and
+// Interrupted.
+void RequireReadableScans(const Chain& chain);
+// The picks' table, columns and numbers; which photos they name is known when there is a model.
+// Throws InputError.
 void RequireReadablePicks(const std::string& path);
 
 }  // namespace roomtex

@@ -10,6 +10,7 @@
 #include "core/child_program.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "workflow/own_commands.h"
 #include "workflow/step_lines.h"
 
 namespace roomtex {
@@ -26,9 +27,7 @@ std::set<std::string> OptionsOfOurs(const std::string& command) {
                                   [](unsigned char letter) { return std::isspace(letter); });
     names.insert(std::string(line.begin() + 2, end));
   };
-  RunChild({FindProgram(BesideThisProgram(command), "Install all commands of roomtex together"),
-            "--help"},
-           settings);
+  RunChild({FindOwnCommand(command), "--help"}, settings);
   return names;
 }
 

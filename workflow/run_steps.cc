@@ -15,6 +15,7 @@
 #include "workflow/late_inputs.h"
 #include "workflow/made_from.h"
 #include "workflow/output_folder.h"
+#include "workflow/own_commands.h"
 #include "workflow/remaining_time.h"
 #include "workflow/step.h"
 
@@ -81,7 +82,7 @@ class StepRunner {
                     [this](const StepRow& row) { return state_.Find(row.name) != nullptr; });
     if (IsAskedFor(align->name, chain_.options()) ? IsUpToDate(*align) : is_begun) return;
     context_.progress.Stage("look at scans");
-    RequireReadableScans(chain_.options());
+    RequireReadableScans(chain_);
     if (!chain_.PicksPath().empty()) RequireReadablePicks(chain_.PicksPath());
     context_.progress.Finish();
     ThrowIfInterrupted();
@@ -387,8 +388,8 @@ class StepRunner {
       record->peak_memory_bytes = std::max(record->peak_memory_bytes, run.peak_memory_bytes);
       if (run.success) continue;
       const bool is_ours = BeginsWith(line[0], "roomtex-");
-      record->reason =
-          is_ours ? ReasonOf(step, run) : line[0] + " " + run.failure + ": " + run.LastLines();
+      record->reason = is_ours ? ReasonOf(step.commands[0][0], chain_.ReportOf(step.name), run)
+                               : line[0] + " " + run.failure + ": " + run.LastLines();
       const bool untrusted = is_ours && run.exit_code == kExitUntrusted;
       record->state = untrusted ? StepState::kUntrusted : StepState::kFailed;
       exit_code_ = untrusted             ? kExitUntrusted
@@ -403,10 +404,9 @@ class StepRunner {
   ChildRun RunOne(const Step& step, const CommandLine& line) {
     CommandLine arguments = line;
     const bool is_ours = BeginsWith(line[0], "roomtex-");
-    arguments[0] = line[0] == chain_.options().colmap
-                       ? chain_.Colmap().path()
-                       : FindProgram(is_ours ? BesideThisProgram(line[0]) : line[0],
-                                     "Install all commands of roomtex together");
+    arguments[0] = line[0] == chain_.options().colmap ? chain_.Colmap().path()
+                   : is_ours                          ? FindOwnCommand(line[0])
+                                                      : FindProgram(line[0], "Install it");
     ChildSettings settings;
     settings.log_path = chain_.LogOf(step.name);
     settings.stop_signal = is_ours ? SIGTERM : SIGKILL;
@@ -418,19 +418,6 @@ class StepRunner {
     };
     settings.on_wait = [this] { ShowTime(); };
     return RunChild(arguments, settings);
-  }
-
-  // The command's own reason, or what it said last.
-  std::string ReasonOf(const Step& step, const ChildRun& run) const {
-    const Json report = ReadJsonFile(chain_.ReportOf(step.name));
-    if (report.is_object() && !report.value("reason", std::string()).empty()) {
-      return report["reason"].get<std::string>();
-    }
-    for (size_t i = run.last.size(); i-- > 0;) {
-      const std::string prefix = step.commands[0][0] + ": ";
-      if (BeginsWith(run.last[i], prefix)) return run.last[i].substr(prefix.size());
-    }
-    return run.failure + (run.last.empty() ? "" : ": " + run.last.back());
   }
 
   // ---- time

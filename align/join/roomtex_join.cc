@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -18,6 +17,7 @@
 #include "core/json_text.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
+#include "core/standard_files.h"
 #include "core/stays_inside.h"
 
 namespace roomtex {
@@ -257,8 +257,9 @@ void Join(const JoinOptions& options, const Command::Context& context) {
   WriteMatrices(rooms, graph, options.output_path, outputs.get());
   WriteScene(rooms, graph, options.output_path, outputs.get(), context);
   CommitWithReport(kReportName, outputs);
-  std::printf("%td of %zu rooms in the frame of %s, %zu links\n%s\n", num_joined, rooms.size(),
-              rooms[0].name.c_str(), links.size(), options.output_path.c_str());
+  AnswerAtEnd(std::to_string(num_joined) + " of " + std::to_string(rooms.size()) +
+              " rooms in the frame of " + rooms[0].name + ", " + std::to_string(links.size()) +
+              " links\n" + options.output_path + "\n");
 }
 
 }  // namespace

@@ -273,8 +273,7 @@ TEST_F(ImportCommand, WrongUsageIsToldBeforeTheInputIsRead) {
       {Output("a.ply") + " --max_range -1", "--max_range"},
       {Output("a.ply") + " --azimuth left", "--azimuth"},
       {Output("a.ply") + " --units miles", "--units"},
-      {Output("a.ply") + " --colour 1", "--colour"},
-      {"", "--output_path"}};
+      {Output("a.ply") + " --colour 1", "--colour"}};
   for (const auto& [arguments, text] : cases) {
     const CommandResult result = RunOn("no_such_file.rtpi", arguments);
     EXPECT_EQ(result.exit_code, 2) << arguments;

@@ -64,8 +64,35 @@ TEST_F(AutoStart, SaysWhatIsWrongWithTheScansBeforeTheFirstStep) {
   ExpectRefused(Scan() + "--scan_path " + (folder_ / "again.xyz") + " --scan_poses " +
                     (folder_ / "poses.txt"),
                 "poses.txt: line 1");
+  // In the words of the reader, and nothing else.
+  EXPECT_EQ(Run("--quiet --scan_path " + (folder_ / "empty.e57")).err,
+            "roomtex-auto: " + (folder_ / "empty.e57") +
+                ": is empty. Give an RTPI, a PTX, an E57, a PCD, a PLY, a LAS, an OBJ mesh or "
+                "points as text (the content counts, not the name).\n");
   // Step by step, as a site has it: with the first.
   ExpectRefused("--until features --scan_path " + (folder_ / "empty.e57"), "empty.e57: is empty");
+}
+
+TEST_F(AutoStart, LooksAtTheScansAsTheyWillBeRead) {
+  EXPECT_EQ(Run(Scan() + "--units feet --up_axis -y --azimuth counterclockwise --E57.check 0 "
+                         "--max_range 4")
+                .exit_code,
+            3);
+  EXPECT_TRUE(HasBegun());
+  const json report = json::parse(ReadBytes(folder_ / "result/log/scans.json"));
+  const json& options = report["options"];
+  EXPECT_EQ(options["units"], "feet");
+  EXPECT_EQ(options["up_axis"], "-y");
+  EXPECT_EQ(options["azimuth"], "counterclockwise");
+  EXPECT_EQ(options["E57.check"], false);
+  EXPECT_EQ(options["max_range"], 4.0);
+  // Beyond 13.12 feet: six rows, and two of the row at 13 that are 1.8 and 1.9 aside.
+  EXPECT_EQ(report["num_missing"], 122);
+  EXPECT_THAT(ReadBytes(folder_ / "result/log/scans.log"), HasSubstr("room.xyz: XYZ"));
+  // What roomtex-import itself does not take for granted.
+  ASSERT_EQ(Run(Scan()).exit_code, 3);
+  EXPECT_EQ(json::parse(ReadBytes(folder_ / "result/log/scans.json"))["options"]["azimuth"],
+            "auto");
 }
 
 TEST_F(AutoStart, SaysWhatIsWrongWithThePicksBeforeTheFirstStep) {

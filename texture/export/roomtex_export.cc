@@ -1,6 +1,5 @@
 // roomtex-export: aligned photos and scan for programs that go on from there.
 
-#include <cstdio>
 #include <memory>
 
 #include "colmap_ext/sparse_model.h"
@@ -9,6 +8,7 @@
 #include "core/option_fields.h"
 #include "core/output_set.h"
 #include "core/resource_limits.h"
+#include "core/standard_files.h"
 #include "core/surfels.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
@@ -217,7 +217,7 @@ void Export(const ExportCommandOptions& options, const Command::Context& context
   ReportPhotosLeftOut(list.left_out, context);
   context.report["entries"] = outputs->Entries();
   CommitWithReport("report.json", outputs);
-  std::printf("%s\n", options.output_path.c_str());
+  AnswerAtEnd(options.output_path + "\n");
 }
 
 }  // namespace

@@ -418,6 +418,17 @@ TEST_F(JoinCommand, MakesNoSceneWhereNothingLinksTheRooms) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "joined/site.gltf"));
 }
 
+// Who reads a path on stdout finds what is there.
+TEST_F(JoinCommand, NamesNoFolderThatDoesNotAppear) {
+  AddRoom("hall", Rigid());
+  AddRoom("library", Turned(90, {5, 5, 0}));
+  AddDoor("hall", "library", 3, {1, 2, 1});
+  EXPECT_EQ(Join("--report_path /sys/r.json").out, "");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "joined/joined.json"));
+  EXPECT_EQ(Join().out,
+            "2 of 2 rooms in the frame of hall, 1 links\n" + (folder_ / "joined") + "\n");
+}
+
 // A matrix of a room that is in no common frame would lay it over the first one.
 TEST_F(JoinCommand, WritesNoPlaceOfARoomThatIsNowhere) {
   AddRoom("hall", Rigid());

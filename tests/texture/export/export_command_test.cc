@@ -245,8 +245,12 @@ TEST_F(ExportCommand, FisheyesBecomePinholePictures) {
 
 TEST_F(ExportCommand, ScansAndPhotosBecomeOneE57) {
   EXPECT_EQ(Export("e57", "--format e57 --max_image_size 200").exit_code, 2);
+  // What does not appear is not named.
+  EXPECT_EQ(Export("e57", "--format e57 --report_path /sys/r.json").out, "");
+  EXPECT_FALSE(fs::exists(Path("e57/scan.e57")));
   const CommandResult result = Export("e57", "--format e57");
   ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out, Path("e57") + "\n");
   const ScanFile file = ReadScanFile(Path("e57/scan.e57"), {});
   EXPECT_EQ(file.scans.at(0).num_columns, 700);
 }
