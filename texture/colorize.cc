@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -21,6 +20,7 @@
 #include "core/statistics.h"
 #include "core/surfels.h"
 #include "texture/debug_images.h"
+#include "texture/sampling/looked_past.h"
 #include "texture/sampling/photo_pass.h"
 #include "texture/sampling/single_holes.h"
 #include "texture/texels/texture_grid.h"
@@ -48,16 +48,15 @@ double SpacingInPhotos(const CloudSurface& cloud, const std::vector<PhotoView>& 
 
 // What the scanner could not see from a station, as a grid around that shows it.
 void AddShadows(const Scan& cloud, const CloudStation& station, const ColorizeOptions& options,
-                int num_threads, OccluderTiles* occluder) {
+                int num_threads, ShadowsOfStations* shadows) {
   constexpr double kStep = 1.5;     // spacings; finer leaves cells empty
   constexpr double kFinest = 2e-3;  // radians; shadows need not be exact
   const double step = std::max(kFinest, kStep * station.angular_spacing);
   const Scan grid = GridAroundStation(cloud, station.place, station.begin, station.end,
                                       static_cast<int>(std::lround(kPi / step)) + 1);
-  OccluderTiles tiles =
-      MakeOccluderTiles(grid, MakeSmoothedScan(grid, options.mesh, options.surface, num_threads));
-  std::move(tiles.shadows.begin(), tiles.shadows.end(), std::back_inserter(occluder->shadows));
-  std::move(tiles.fringes.begin(), tiles.fringes.end(), std::back_inserter(occluder->fringes));
+  const SmoothedScan surface = MakeSmoothedScan(grid, options.mesh, options.surface, num_threads);
+  OccluderTiles tiles = MakeOccluderTiles(grid, surface);
+  shadows->Take(grid, surface.angular_spacing, surface.range_noise, &tiles);
 }
 
 // The front of a surface is where it was measured from. Returns whether all points have one.
@@ -76,7 +75,7 @@ bool TurnToStations(const std::vector<CloudStation>& stations, CloudSurface* clo
 // The samples are the points of the cloud, what hides them are its surfels.
 SmoothedScan SurfaceOfCloud(const Scan& scan, const std::vector<PhotoView>& photos,
                             const ColorizeOptions& options, int num_threads,
-                            OccluderTiles* occluder) {
+                            OccluderTiles* occluder, ShadowsOfStations* shadows) {
   CloudSurface cloud = FindCloudSurface(scan, num_threads);
   SmoothedScan surface;
   surface.range_noise = cloud.noise;
@@ -94,7 +93,7 @@ SmoothedScan SurfaceOfCloud(const Scan& scan, const std::vector<PhotoView>& phot
   surface.front_is_known = cloud.front_is_known || TurnToStations(stations, &cloud);
   surface.has_shadows = !stations.empty();
   for (const CloudStation& station : stations) {
-    AddShadows(scan, station, options, num_threads, occluder);
+    AddShadows(scan, station, options, num_threads, shadows);
   }
   surface.points = std::move(cloud.points);
   surface.normals = std::move(cloud.normals);
@@ -117,16 +116,21 @@ Scene MakeSamples(const std::vector<Scan>& scans, const std::vector<PhotoView>& 
   const CpuTimer timer(CpuStage::kMesh, CpuTimer::Scope::kProcess);
   Scene scene;
   PhotoPassInput& input = scene.input;
+  ShadowsOfStations shadows;
   for (const Scan& scan : scans) {
     const bool is_cloud = scan.kind() == Scan::Kind::kCloud;
     SmoothedScan surface;
     input.occluders.emplace_back();
     if (is_cloud) {
-      surface = SurfaceOfCloud(scan, photos, options, num_threads, &input.occluders.back());
+      surface =
+          SurfaceOfCloud(scan, photos, options, num_threads, &input.occluders.back(), &shadows);
       if (!options.surface.reduce_range_noise) surface.points = scan.points;
     } else {
       surface = MakeSmoothedScan(scan, options.mesh, options.surface, num_threads);
       input.occluders.back() = MakeOccluderTiles(scan, surface);
+      if (scan.organised) {
+        shadows.Take(scan, surface.angular_spacing, surface.range_noise, &input.occluders.back());
+      }
     }
     const Eigen::Vector3d station =
         surface.station_is_known ? scan.Station() : Eigen::Vector3d(Scan::MissingPoint());
@@ -144,6 +148,7 @@ Scene MakeSamples(const std::vector<Scan>& scans, const std::vector<PhotoView>& 
     }
     scene.surfaces.push_back(std::move(surface));
   }
+  if (!scans.empty()) shadows.Give(&input.occluders.back(), num_threads);
   return scene;
 }
 

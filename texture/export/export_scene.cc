@@ -11,6 +11,7 @@
 #include "core/cell_key.h"
 #include "core/error.h"
 #include "importers/ply.h"
+#include "texture/sampling/looked_past.h"
 
 namespace roomtex {
 namespace {
@@ -197,10 +198,14 @@ ExportScene MakeExportScene(const std::vector<Scan>& scans, const ScanColors& co
   ExportScene scene;
   PhotoPassInput input;
   std::vector<Candidate> candidates;
+  ShadowsOfStations shadows;
   for (size_t s = 0; s < scans.size(); ++s) {
     const Scan& scan = scans[s];
     const SmoothedScan surface = MakeSmoothedScan(scan, {}, {}, num_threads);
     scene.occluders.push_back(MakeOccluderTiles(scan, surface));
+    if (scan.organised) {
+      shadows.Take(scan, surface.angular_spacing, surface.range_noise, &scene.occluders.back());
+    }
     if (surface.angular_spacing > 0 &&
         (!(scene.angular_spacing > 0) || surface.angular_spacing < scene.angular_spacing)) {
       scene.angular_spacing = surface.angular_spacing;
@@ -223,6 +228,7 @@ ExportScene MakeExportScene(const std::vector<Scan>& scans, const ScanColors& co
       }
     }
   }
+  if (!scans.empty()) shadows.Give(&scene.occluders.back(), num_threads);
   scene.samples = std::move(input.samples);
   scene.point_of_sample.assign(scene.colors.size(), -1);
   for (const int i : SpreadEvenly(candidates, max_points)) {

@@ -39,8 +39,10 @@ struct TwoWalls {
   }
 
   // columns x rows samples over +-half_angle in azimuth and elevation.
-  Scan MakeScan(int columns, int rows, double half_angle = 0.5) const {
+  Scan MakeScan(int columns, int rows, double half_angle = 0.5,
+                const Eigen::Vector3d& station = Eigen::Vector3d::Zero()) const {
     Scan scan;
+    scan.scan_from_station.translation = station;
     scan.num_columns = columns;
     scan.num_rows = rows;
     for (int r = 0; r < rows; ++r) {
@@ -50,7 +52,7 @@ struct TwoWalls {
         const Eigen::Vector3d direction(std::sin(azimuth) * std::cos(elevation),
                                         std::sin(elevation),
                                         -std::cos(azimuth) * std::cos(elevation));
-        scan.points.push_back(Hit(Eigen::Vector3d::Zero(), direction));
+        scan.points.push_back(Hit(station, direction));
         scan.intensity.push_back(static_cast<float>(10 + c % 50));
       }
     }
