@@ -246,8 +246,8 @@ TEST_F(TextureCommand, TakesManyStationsOneByOne) {
   options.num_photos = 8;
   options.photo_width = 720;
   options.photo_height = 480;
-  options.scan_columns = 400;
-  options.scan_rows = 152;
+  options.scan_columns = 600;
+  options.scan_rows = 228;
   Progress progress(true);
   const SimulatedRoom room(options);
   WriteCapture(room, Path("site"), &progress);
@@ -264,9 +264,9 @@ TEST_F(TextureCommand, TakesManyStationsOneByOne) {
                           " --Texture.scale 2 --output_web 0 --output_path " + Path(output) + more);
   };
   ASSERT_EQ(texture({0, 1, 2}, "at_once", "").exit_code, 0);
-  const CommandResult one_by_one = texture({0, 1, 2}, "one_by_one", " --max_samples 100000");
+  const CommandResult one_by_one = texture({0, 1, 2}, "one_by_one", " --max_samples 225000");
   ASSERT_EQ(one_by_one.exit_code, 0) << one_by_one.err;
-  ASSERT_EQ(texture({2, 0, 1}, "turned", " --max_samples 100000 --num_threads 1").exit_code, 0);
+  ASSERT_EQ(texture({2, 0, 1}, "turned", " --max_samples 225000 --num_threads 1").exit_code, 0);
   const json report = ReadJson(Path("one_by_one/report.json"));
   EXPECT_EQ(report["sample_stride"], 2);
   ASSERT_EQ(report["stations"].size(), 3u);
@@ -300,7 +300,7 @@ TEST_F(TextureCommand, TakesManyStationsOneByOne) {
     first += count;
     RecordProperty("psnr_one_by_one_" + std::to_string(k), std::to_string(Psnr(station, truth)));
     RecordProperty("psnr_at_once_" + std::to_string(k), std::to_string(Psnr(held, truth)));
-    // Of these scans the thinned ones have a sample every 12 cm at 4 m.
+    // Of these scans the thinned ones have a sample every 8 cm at 4 m.
     EXPECT_GT(Psnr(station, truth), Psnr(held, truth) - 0.5);
     EXPECT_GT(static_cast<double>(num_same_sight) / static_cast<double>(count), 0.93);
     // The same bytes, whatever its number.
