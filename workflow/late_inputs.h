@@ -1,6 +1,6 @@
 #pragma once
-// What no step reads before the last ones do. Looked at when a run begins, so that what is wrong
-// there is said before the hours that features and matches take.
+// Scans, which no step reads before the last ones do. Looked at when a run begins, so that what is
+// wrong there is said before the hours that features and matches take.
 
 #include <string>
 
@@ -12,8 +12,5 @@ namespace roomtex {
 // reports lies in log/scans.log and .json. Throws InputError or UsageError with what it says, and
 // Interrupted.
 void RequireReadableScans(const Chain& chain);
-// The picks' table, columns and numbers; which photos they name is known when there is a model.
-// Throws InputError.
-void RequireReadablePicks(const std::string& path);
 
 }  // namespace roomtex

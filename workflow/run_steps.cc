@@ -10,6 +10,7 @@
 #include "core/child_program.h"
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/pick_table.h"
 #include "core/text.h"
 #include "workflow/align_remedies.h"
 #include "workflow/late_inputs.h"
@@ -83,7 +84,8 @@ class StepRunner {
     if (IsAskedFor(align->name, chain_.options()) ? IsUpToDate(*align) : is_begun) return;
     context_.progress.Stage("look at scans");
     RequireReadableScans(chain_);
-    if (!chain_.PicksPath().empty()) RequireReadablePicks(chain_.PicksPath());
+    // Which photos they name is known when there is a model.
+    if (!chain_.PicksPath().empty()) ReadPicks(chain_.PicksPath());
     context_.progress.Finish();
     ThrowIfInterrupted();
   }

@@ -102,12 +102,12 @@ TEST_F(AutoStart, SaysWhatIsWrongWithThePicksBeforeTheFirstStep) {
     ExpectRefused(Scan() + "--picks_path " + (folder_ / "picks.csv"), finding);
   };
   expect("", "holds no picks");
-  expect("a100.jpg,1,2,3,4,5\n", "line 1: \"a100.jpg,1,2,3,4,5\" is no header");
-  expect(header + "\na100.jpg,1,2,3,4\n", "line 2: \"a100.jpg,1,2,3,4\" is no pick");
-  expect(header + "\na100.jpg,1,2,3,4,left\n", "is no pick");
+  expect("a100.jpg,1,2,3,4,5\n", "line 1: the header is missing");
+  expect(header + "\na100.jpg,1,2,3,4\n", "line 2: found 5 fields, expected 6");
+  expect(header + "\na100.jpg,1,2,3,4,left\n", "scan_z is \"left\"");
   // Those that lie where roomtex-pick puts them, too.
   WriteBytes(folder_ / "result/picks.csv", "nothing\n");
-  ExpectRefused(Scan(), "is no header of a picks file");
+  ExpectRefused(Scan(), "where the header of a picks file should be");
   // Comments, weights and labels are as they should be.
   fs::remove(folder_ / "result/picks.csv");
   WriteBytes(folder_ / "picks.csv",
