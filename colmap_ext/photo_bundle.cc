@@ -37,6 +37,8 @@ constexpr double kLeastFreeShare = 0.3;
 constexpr int kMinObservations = 6;
 // How exactly the scale is held, a share.
 constexpr double kScaleShare = 1e-3;
+// What a pose is known to before any photo is asked: radians, and extents of all the photos.
+constexpr double kPoseSpread = 10;
 // More unknowns than these would need too large a dense matrix for their covariance.
 constexpr int kMaxUnknowns = 4000;
 
@@ -332,6 +334,7 @@ class PhotoNormal {
       if (offset != pose_offset_.end()) {
         normal->AddInformation(offset->second + 3, hold.by.transpose() * hold.by);
       }
+      AddPosePriors(1 / (kScaleShare * hold.by.norm()), normal);
     }
     for (size_t i = 0; i < lens_offset_.size(); ++i) {
       if (lens_offset_[i] < 0) continue;
@@ -354,6 +357,17 @@ class PhotoNormal {
     // With a lens for every photo nothing is left by which photos could differ.
     const bool is_shared = num_params <= 2 * static_cast<int>(held_.size());
     if (!covariances.empty() && is_shared) FindScatter(*normal, blocks);
+  }
+
+  // Two halves of a model that few points connect leave their scales open to each other, the more
+  // so as only a part of the points is asked. No lens depends on that. extent: distance of the
+  // farthest photo from the first.
+  void AddPosePriors(double extent, ReducedNormal* normal) const {
+    Eigen::Matrix<double, 6, 1> sigmas;
+    sigmas << Eigen::Vector3d::Constant(kPoseSpread),
+        Eigen::Vector3d::Constant(kPoseSpread * extent);
+    const Eigen::MatrixXd information = sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+    for (const auto& [id, offset] : pose_offset_) normal->AddInformation(offset, information);
   }
 
   // To first order the residuals of a photo move the lenses by `lenses_by` times its part of the

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <random>
 #include <string>
@@ -120,6 +121,47 @@ TEST(LensCheck, AWrongFocalLengthIsFoundAndMended) {
   ASSERT_EQ(held.lenses.size(), 1u);
   EXPECT_TRUE(held.lenses[0].Contradicts());
   EXPECT_FALSE(held.lenses[0].used);
+}
+
+// Two halves of a model that share one photo and no point: how large one is beside the other stays
+// open, but their lens does not.
+SparseModel AsTwoHalves(SparseModel model) {
+  const uint32_t shared = std::next(model.images.begin(), 8)->first;
+  const SparseModel whole = model;
+  for (auto& [id, image] : model.images) {
+    std::fill(image.point3d_ids.begin(), image.point3d_ids.end(), kInvalidPoint3dId);
+  }
+  for (const auto& [point_id, point] : whole.points) {
+    std::vector<TrackElement> first, second;
+    for (const TrackElement& element : point.track) {
+      if (element.image_id <= shared) first.push_back(element);
+      if (element.image_id >= shared) second.push_back(element);
+    }
+    std::vector<TrackElement>& track = model.points.at(point_id).track;
+    track = first.size() >= second.size() ? first : second;
+    if (track.size() < 2) {
+      model.points.erase(point_id);
+      continue;
+    }
+    for (const TrackElement& element : track) {
+      model.images.at(element.image_id).point3d_ids[element.point2d_index] = point_id;
+    }
+  }
+  return model;
+}
+
+TEST(LensCheck, HalvesThatOnePhotoConnectsKnowTheirLens) {
+  for (int seed = 1; seed <= 3; ++seed) {
+    SparseModel wrong = AsTwoHalves(TrueModel(seed));
+    const double f = wrong.cameras.at(1).MeanFocalLength();
+    Scale(1.045, &wrong.cameras.at(1));
+    const LensCheck check = CheckLenses(Mapped(wrong), {}, RefineIntrinsics::kAuto);
+    ASSERT_EQ(check.lenses.size(), 1u);
+    const LensFinding& lens = check.lenses[0];
+    EXPECT_TRUE(lens.used) << seed;
+    EXPECT_LT(lens.focal_sigma, 0.01 * f) << seed;
+    EXPECT_LT(std::abs(lens.found.MeanFocalLength() - f), 4 * lens.focal_sigma + 0.1) << seed;
+  }
 }
 
 // What a bundle adjustment of single photos cannot mend it can look at.
