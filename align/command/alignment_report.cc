@@ -218,6 +218,9 @@ void AddVerdicts(const std::map<uint32_t, PhotoVerdict>& photos, const SparseMod
     one["unevenness"] = NumberOrNull(photo.unevenness);
     one["surface_share"] = NumberOrNull(photo.surface_share);
     one["match_support"] = NumberOrNull(photo.match_support);
+    const bool asked = photo.detail.num_windows > 0;
+    one["detail_windows"] = asked ? Json(photo.detail.num_windows) : Json(nullptr);
+    one["detail_share"] = NumberOrNull(photo.detail.Share());
     one["duplicate_of"] = photo.duplicate_of.empty() ? Json(nullptr) : Json(photo.duplicate_of);
     one["doubt"] = photo.doubt.empty() ? Json(nullptr) : Json(photo.doubt);
   }

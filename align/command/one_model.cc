@@ -265,11 +265,31 @@ DuplicatesAside SetDuplicatesAside(const MapperVerdict& verdict, const std::vect
   return aside;
 }
 
+// Doubts end of photos that lack what others found, but show what others show: photos taken from
+// far apart are not matched.
+void BelieveWhatShowsTheSame(const AlignedPhotos& aligned, const SurveyedScans& surveyed,
+                             int num_threads, std::map<uint32_t, PhotoVerdict>* photos) {
+  std::set<uint32_t> asked, doubtful;
+  for (const auto& [id, photo] : *photos) {
+    if (photo.doubt.empty()) continue;
+    doubtful.insert(id);
+    if (photo.lacks_sights) asked.insert(id);
+  }
+  if (asked.empty() || aligned.image_path.empty()) return;
+  for (const auto& [id, detail] :
+       CompareDetail(aligned, surveyed.viewer(), asked, doubtful, DetailOptions(), num_threads)) {
+    PhotoVerdict& photo = photos->at(id);
+    photo.detail = detail;
+    if (detail.Agrees()) photo.doubt.clear();
+  }
+}
+
 // Photos that agree with nobody are named; too many of them, and the model is not to be trusted.
 std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(
-    const AlignCommandOptions& a, const Database* database, const SparseModel& aligned,
+    const AlignCommandOptions& a, const Database* database, const AlignedPhotos& photographed,
     const std::vector<Pick>& picks, const std::set<uint32_t>& ran_away,
     const SurveyedScans& surveyed, const Command::Context& context) {
+  const SparseModel& aligned = photographed.model;
   constexpr double kMostDoubtful = 0.34;
   context.progress.Stage("single photos");
   std::map<uint32_t, double> support;
@@ -293,7 +313,9 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(
     photos.at(id).doubt =
         "its points want it elsewhere than the sparse model has it, so that it was not adjusted to "
         "the scan, and how far it is off is not known";
+    photos.at(id).lacks_sights = false;
   }
+  BelieveWhatShowsTheSame(photographed, surveyed, context.options.num_threads, &photos);
   size_t num_doubtful = 0;
   for (const auto& [id, photo] : photos) {
     if (photo.doubt.empty()) continue;
@@ -431,14 +453,15 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
   FillReport(alignment, after.rms_px, &context.report);
   context.report["cameras"] = CamerasToJson(alignment);
+  if (alignment.rolling_shutter) aligned.row_motions = alignment.rolling_shutter->motions;
+  const AlignedPhotos photographed{model, a.image_path, aligned.row_motions};
   auto photos =
-      JudgeSinglePhotos(a, database, model, one.picks, alignment.adjustment.bundle.ran_away,
+      JudgeSinglePhotos(a, database, photographed, one.picks, alignment.adjustment.bundle.ran_away,
                         *reading->surveyed, context);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
-  if (alignment.rolling_shutter) aligned.row_motions = alignment.rolling_shutter->motions;
-  const WhatPhotosSay photos_say = CompareWithPhotos(a, {model, a.image_path, aligned.row_motions},
-                                                     *reading->surveyed, one.told, context);
+  const WhatPhotosSay photos_say =
+      CompareWithPhotos(a, photographed, *reading->surveyed, one.told, context);
   CarryMapperVerdict(verdict, alignment, photos_say.agree, context);
   if (reading->search.is_null()) DoubtRoom(a, photos_say, alignment.disagreement.rms, context);
   for (auto& [id, points2d] : keypoints) model.images.at(id).points2d = std::move(points2d);

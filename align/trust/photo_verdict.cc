@@ -217,6 +217,7 @@ std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned, const S
           "places: another room that is alike, or this one when things stood otherwise. ",
           elsewhere.size());
     } else if (LacksWhatOthersFound(photo, usual)) {
+      photo.lacks_sights = true;
       photo.doubt = "of the sparse points that it ought to show it has only " +
                     Percent(photo.sight_share) + " (usual here: " + Percent(usual.median) + "). ";
     } else {

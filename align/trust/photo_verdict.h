@@ -11,6 +11,7 @@
 
 #include "align/surface/scan_patches.h"
 #include "align/trust/free_space.h"
+#include "align/trust/photo_detail.h"
 #include "colmap_ext/sparse_model.h"
 
 namespace roomtex {
@@ -34,6 +35,10 @@ struct PhotoVerdict {
   // Share of its verified matches that obey the model's poses; unknown without a database.
   double match_support = kUnknownShare;
   std::string duplicate_of;  // a photo that shows the same from the same place; "" = none
+  // It lacks what others found. That is all that the doubt rests on: what it shows in detail may
+  // overrule it.
+  bool lacks_sights = false;
+  DetailAgreement detail;  // no windows = not asked
   // Why it is not to be believed, a sentence without the photo's name in front; "" = nothing speaks
   // against it.
   std::string doubt;
