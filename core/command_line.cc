@@ -187,8 +187,8 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
     std::cerr << impl_->name << ": " << written.failure << "\n";
     if (exit_code == kExitDone || exit_code == kExitUntrusted) exit_code = written.exit_code;
   }
-  const std::string answer_at_end = TakeAnswer();
-  if (ran_to_end && written.exit_code == kExitDone) std::cout << answer_at_end;
+  const std::string answer_at_end = TakeAnswer(ran_to_end);
+  if (written.exit_code == kExitDone) std::cout << answer_at_end;
   if (!FlushAnswer(impl_->name) && (exit_code == kExitDone || exit_code == kExitUntrusted)) {
     exit_code = kExitInput;
   }

@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/input_guard.h"
+#include "core/jpeg_facts.h"
 #include "core/output_file.h"
 
 namespace roomtex {
@@ -45,28 +46,6 @@ Exiv2::URational RationalOf(double value) {
   const double denominator = std::floor(std::clamp(kLargest / value, 1.0, 1e6));
   return {static_cast<uint32_t>(std::min(kLargest, std::round(value * denominator))),
           static_cast<uint32_t>(denominator)};
-}
-
-// A JPEG decoder fills what a cut-off file lacks with grey and calls it a picture. Walks over the
-// segments and the coded data to the end-of-image marker (ITU T.81, annex B); bytes behind it are
-// allowed.
-bool IsWholeJpeg(const std::vector<unsigned char>& bytes) {
-  const auto marker_at = [&](size_t i) { return bytes[i] == 0xff && bytes[i + 1] != 0xff; };
-  size_t i = 2;
-  while (i + 1 < bytes.size()) {
-    if (!marker_at(i)) {
-      ++i;  // fill bytes
-      continue;
-    }
-    const int marker = bytes[i + 1];
-    if (marker == 0xd9) return true;
-    i += 2;
-    const bool stands_alone = marker == 0 || marker == 1 || (marker >= 0xd0 && marker <= 0xd7);
-    if (stands_alone) continue;
-    if (i + 1 >= bytes.size()) return false;
-    i += bytes[i] << 8 | bytes[i + 1];  // length of the segment
-  }
-  return false;
 }
 
 std::vector<unsigned char> ReadBytes(const std::string& path) {
@@ -194,6 +173,22 @@ void RefuseRealNumbers(const std::string& path, const std::vector<unsigned char>
                    "Export it with 8 or 16 bits");
 }
 
+// Decoders fill what a cut-off file lacks with grey, and take inks for Adobe's, which are the other
+// way round than others: white became black.
+void RefuseBrokenJpeg(const std::string& path, const std::vector<unsigned char>& bytes) {
+  if (bytes.size() <= 2 || bytes[0] != 0xff || bytes[1] != 0xd8) return;
+  const JpegFacts facts = FindJpegFacts(bytes);
+  if (!facts.is_whole) {
+    throw InputError(path, BytePosition(static_cast<long long>(bytes.size())),
+                     "the file ends before the picture does", "Copy it again from the camera");
+  }
+  if (facts.num_components == 4 && !facts.has_adobe_marker) {
+    throw InputError(path, "",
+                     "is a JPEG of four inks (CMYK) that does not say which way round they are",
+                     "Export it as RGB");
+  }
+}
+
 // By the file's header: what is asked for every photo decodes none that cannot be transparent.
 bool MayHaveAlpha(const std::string& path) {
   unsigned char start[26] = {};
@@ -225,11 +220,7 @@ cv::Mat DecodePhoto(const std::string& path, int flags) {
   std::vector<unsigned char> bytes = ReadBytes(path);
   RefuseRealNumbers(path, bytes);
   ForgetTiffOrientation(&bytes);
-  const bool is_jpeg = bytes.size() > 2 && bytes[0] == 0xff && bytes[1] == 0xd8;
-  if (is_jpeg && !IsWholeJpeg(bytes)) {
-    throw InputError(path, BytePosition(static_cast<long long>(bytes.size())),
-                     "the file ends before the picture does", "Copy it again from the camera");
-  }
+  RefuseBrokenJpeg(path, bytes);
   cv::Mat image;
   try {
     if (!bytes.empty()) image = cv::imdecode(bytes, flags | cv::IMREAD_IGNORE_ORIENTATION);

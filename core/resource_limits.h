@@ -19,9 +19,9 @@ void RequireMemory(const std::string& path, const std::string& what, double num_
                    const std::string& remedy);
 
 // Bytes of memory that commands take per sample of a scan (docs/reliability.md says how measured).
-inline constexpr double kImportBytesPerSample = 110, kAlignBytesPerSample = 112,
-                        kTextureBytesPerSample = 280, kExportBytesPerSample = 234,
-                        kDenseBytesPerSample = 301;
+inline constexpr double kLookBytesPerSample = 80, kImportBytesPerSample = 110,
+                        kAlignBytesPerSample = 112, kTextureBytesPerSample = 280,
+                        kExportBytesPerSample = 234, kDenseBytesPerSample = 301;
 
 // What a command does with the samples of all scans that it reads while this lives: what they take
 // in the end is compared with what is free before room is made for any. One at a time.

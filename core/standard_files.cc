@@ -14,16 +14,25 @@
 namespace roomtex {
 namespace {
 
-std::string& TheAnswer() {
-  static std::string answer;
+struct Answer {
+  std::string at_end, at_any_end;
+};
+
+Answer& TheAnswer() {
+  static Answer answer;
   return answer;
 }
 
 }  // namespace
 
-void AnswerAtEnd(const std::string& text) { TheAnswer() += text; }
+void AnswerAtEnd(const std::string& text) { TheAnswer().at_end += text; }
 
-std::string TakeAnswer() { return std::exchange(TheAnswer(), ""); }
+void AnswerAtAnyEnd(const std::string& text) { TheAnswer().at_any_end += text; }
+
+std::string TakeAnswer(bool ran_to_end) {
+  const Answer answer = std::exchange(TheAnswer(), Answer());
+  return ran_to_end ? answer.at_any_end + answer.at_end : answer.at_any_end;
+}
 
 void OpenStandardFiles() {
   int file = 0;

@@ -300,11 +300,19 @@ class DocumentParser {
     const pugi::xml_node blob = jpeg ? jpeg : png;
     if (!blob) return;
     image->is_png = !jpeg;
-    image->num_bytes = IntegerAttribute(blob, "length", 0);
-    if (image->num_bytes <= 0) {
-      throw Error(blob, "says a picture of " + std::to_string(image->num_bytes) + " bytes");
+    ParseBlob(blob, "a picture", &image->section, &image->num_bytes);
+    if (const pugi::xml_node mask = node.child("imageMask")) {
+      ParseBlob(mask, "a mask", &image->mask_section, &image->num_mask_bytes);
     }
-    image->section = SectionOf(blob, "the bytes of a picture");
+  }
+
+  void ParseBlob(const pugi::xml_node& blob, const std::string& what, int64_t* section,
+                 int64_t* num_bytes) const {
+    *num_bytes = IntegerAttribute(blob, "length", 0);
+    if (*num_bytes <= 0) {
+      throw Error(blob, "says " + what + " of " + std::to_string(*num_bytes) + " bytes");
+    }
+    *section = SectionOf(blob, "the bytes of " + what);
   }
 
   const E57Pages& pages_;

@@ -57,7 +57,9 @@ struct E57Image {
   Kind kind = Kind::kVisual;
   bool is_png = false;
   int64_t section = 0, num_bytes = 0;  // logical offset of the blob, size of the picture
-  int64_t width = 0, height = 0;       // pixels
+  // The same of the mask, a PNG that is 0 where the picture shows nothing; 0 bytes = there is none.
+  int64_t mask_section = 0, num_mask_bytes = 0;
+  int64_t width = 0, height = 0;  // pixels
   // Pinhole: focal length, width and height of a pixel in metres, principal point in pixels.
   // Spherical and cylindrical: width and height of a pixel in radians.
   double focal_length = 0, pixel_width = 0, pixel_height = 0;

@@ -6,6 +6,7 @@
 #include <set>
 
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
 #include "core/frames.h"
@@ -87,31 +88,81 @@ std::string TakeName(const std::string& stem, const std::string& ending,
   }
 }
 
-void CopyBlob(const E57Pages& pages, const E57Image& image, const std::string& path) {
+// Calls take(bytes, count) for all of the blob, piece by piece. what: "a picture".
+template <typename Take>
+void ReadBlob(const E57Pages& pages, int64_t section, int64_t num_bytes, const std::string& what,
+              const Take& take) {
   char header[kBlobHeaderSize];
-  pages.Read(image.section, header, kBlobHeaderSize);
+  pages.Read(section, header, kBlobHeaderSize);
   const auto size = LittleEndian<uint64_t>(header + 8);
   // Some count the padding or leave out the header: at least the picture is there.
-  if (header[0] != 0 || size < static_cast<uint64_t>(image.num_bytes)) {
-    throw InputError(pages.path(), pages.Position(image.section),
+  if (header[0] != 0 || size < static_cast<uint64_t>(num_bytes)) {
+    throw InputError(pages.path(), pages.Position(section),
                      "begins with " + std::to_string(static_cast<unsigned char>(header[0])) +
                          " and " + std::to_string(size) + " bytes, expected a blob (0) of " +
-                         std::to_string(image.num_bytes) + " bytes and more",
+                         std::to_string(num_bytes) + " bytes and more",
                      kDamaged);
   }
-  if (image.num_bytes > pages.logical_size() - image.section - kBlobHeaderSize) {
-    throw InputError(pages.path(), pages.Position(image.section),
-                     "says a picture of " + std::to_string(image.num_bytes) +
+  if (num_bytes > pages.logical_size() - section - kBlobHeaderSize) {
+    throw InputError(pages.path(), pages.Position(section),
+                     "says " + what + " of " + std::to_string(num_bytes) +
                          " bytes, which the file does not have",
                      kDamaged);
   }
-  OutputFile output(path);
-  std::vector<char> bytes(static_cast<size_t>(std::min(kCopyAtOnce, image.num_bytes)));
-  for (int64_t at = 0; at < image.num_bytes; at += kCopyAtOnce) {
-    const int64_t count = std::min(kCopyAtOnce, image.num_bytes - at);
-    pages.Read(image.section + kBlobHeaderSize + at, bytes.data(), count);
-    output.stream().write(bytes.data(), static_cast<std::streamsize>(count));
+  std::vector<char> bytes(static_cast<size_t>(std::min(kCopyAtOnce, num_bytes)));
+  for (int64_t at = 0; at < num_bytes; at += kCopyAtOnce) {
+    const int64_t count = std::min(kCopyAtOnce, num_bytes - at);
+    pages.Read(section + kBlobHeaderSize + at, bytes.data(), count);
+    take(bytes.data(), static_cast<std::streamsize>(count));
   }
+}
+
+void CopyPicture(const E57Pages& pages, const E57Image& image, const std::string& path) {
+  OutputFile output(path);
+  ReadBlob(
+      pages, image.section, image.num_bytes, "a picture",
+      [&output](const char* bytes, std::streamsize count) { output.stream().write(bytes, count); });
+  output.Commit();
+}
+
+// Empty if that is no picture.
+cv::Mat DecodeBlob(const E57Pages& pages, int64_t section, int64_t num_bytes,
+                   const std::string& what, int flags) {
+  std::vector<char> bytes;
+  ReadBlob(pages, section, num_bytes, what, [&bytes](const char* more, std::streamsize count) {
+    bytes.insert(bytes.end(), more, more + count);
+  });
+  try {
+    return cv::imdecode(bytes, flags | cv::IMREAD_IGNORE_ORIENTATION);
+  } catch (const cv::Exception&) {
+    return {};
+  }
+}
+
+// 8-bit BGR and alpha, which is 0 where the mask says that the picture shows nothing; empty where
+// no mask says so. fits: false if picture or mask cannot be decoded, or differ in size.
+cv::Mat MaskedPicture(const E57Pages& pages, const E57Image& image, bool* fits) {
+  *fits = true;
+  if (image.num_mask_bytes == 0) return {};
+  cv::Mat picture =
+      DecodeBlob(pages, image.section, image.num_bytes, "a picture", cv::IMREAD_COLOR);
+  const cv::Mat mask =
+      DecodeBlob(pages, image.mask_section, image.num_mask_bytes, "a mask", cv::IMREAD_GRAYSCALE);
+  *fits = !picture.empty() && mask.size() == picture.size();
+  if (!*fits || cv::countNonZero(mask == 0) == 0) return {};
+  cv::Mat with_alpha;
+  cv::cvtColor(picture, with_alpha, cv::COLOR_BGR2BGRA);
+  cv::insertChannel(mask > 0, with_alpha, 3);
+  return with_alpha;
+}
+
+void WritePicture(const cv::Mat& picture, const std::string& path) {
+  std::vector<uchar> bytes;
+  cv::imencode(fs::path(path).extension().string(), picture, bytes,
+               {cv::IMWRITE_JPEG_QUALITY, kFaceQuality});
+  OutputFile output(path);
+  output.stream().write(reinterpret_cast<const char*>(bytes.data()),
+                        static_cast<std::streamsize>(bytes.size()));
   output.Commit();
 }
 
@@ -147,10 +198,19 @@ class ImageExtractor {
       result_.notes.push_back("the photo " + Quoted(image.name) + " has no picture");
       return;
     }
+    bool mask_fits = true;
+    const cv::Mat masked = MaskedPicture(pages_, image, &mask_fits);
     const std::string file =
-        TakeName(FileStem(image.name), image.is_png ? ".png" : ".jpg", &taken_);
+        TakeName(FileStem(image.name), image.is_png || !masked.empty() ? ".png" : ".jpg", &taken_);
     const std::string path = (fs::path(folder_) / file).string();
-    CopyBlob(pages_, image, path);
+    if (masked.empty()) {
+      CopyPicture(pages_, image, path);
+    } else {
+      WritePicture(masked, path);
+    }
+    if (!mask_fits) {
+      result_.notes.push_back(file + " has a mask that does not fit it, which is left out");
+    }
     const auto [width, height] = ReadPhotoSize(path);
     const std::string why_not = AddToModel(image, file, width, height);
     result_.photos.push_back({file, image.name, KindName(image.kind), why_not.empty()});
@@ -224,9 +284,12 @@ class ImageExtractor {
   }
 
   std::string AddFaces(const PosedPhoto& panorama) {
+    const std::string path = (fs::path(folder_) / panorama.name).string();
     cv::Mat picture;
+    cv::Mat1b transparent;
     try {
-      picture = ReadPhoto((fs::path(folder_) / panorama.name).string());
+      picture = ReadPhoto(path);
+      transparent = ReadTransparency(path, PhotoPixels::kAsStored);
     } catch (const InputError&) {
       return "its picture cannot be decoded";
     }
@@ -235,14 +298,14 @@ class ImageExtractor {
     const Camera camera = FaceCamera(panorama.camera, options_.faces);
     int number = 0;
     for (const Eigen::Quaterniond& rotation : FaceRotations(options_.faces)) {
-      const std::string name = stem + "/face_" + std::to_string(++number) + ".jpg";
-      std::vector<uchar> bytes;
-      cv::imencode(".jpg", CutFace(picture, camera, rotation), bytes,
-                   {cv::IMWRITE_JPEG_QUALITY, kFaceQuality});
-      OutputFile output((fs::path(folder_) / name).string());
-      output.stream().write(reinterpret_cast<const char*>(bytes.data()),
-                            static_cast<std::streamsize>(bytes.size()));
-      output.Commit();
+      const std::string name =
+          stem + "/face_" + std::to_string(++number) + (transparent.empty() ? ".jpg" : ".png");
+      cv::Mat face = CutFace(picture, camera, rotation);
+      if (!transparent.empty()) {
+        cv::cvtColor(face, face, cv::COLOR_BGR2BGRA);
+        cv::insertChannel(CutFace(transparent, camera, rotation) == 0, face, 3);
+      }
+      WritePicture(face, (fs::path(folder_) / name).string());
       result_.posed.push_back(
           {name, camera, Rigid{rotation, Eigen::Vector3d::Zero()} * panorama.cam_from_scan});
     }

@@ -38,9 +38,10 @@ struct E57Photos {
   std::vector<std::string> notes;  // why photos are not in the model
 };
 
-// Writes every photo into the folder under its own name (made fit for a file), and, if some have
-// pose and camera, the model folder/sparse: pinhole pictures as PINHOLE, panoramas all around as
-// EQUIRECTANGULAR. Throws InputError with the byte, and for a file without photos.
+// Writes every photo into the folder under its own name (made fit for a file), byte by byte, but
+// one with a mask as a PNG that is transparent where the mask says that it shows nothing; and, if
+// some have pose and camera, the model folder/sparse: pinhole pictures as PINHOLE, panoramas all
+// around as EQUIRECTANGULAR. Throws InputError with the byte, and for a file without photos.
 E57Photos ExtractE57Images(const std::string& path, const std::string& folder,
                            const E57ImageOptions& options, Progress* progress);
 

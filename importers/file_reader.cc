@@ -1,6 +1,7 @@
 #include "importers/file_reader.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cstdlib>
@@ -150,6 +151,28 @@ bool ParseReal(std::string_view word, double* number) {
     return false;
   }
   return end == word.data() + word.size();
+}
+
+bool HasDecimalCommas(std::string_view line) {
+  if (line.find(',') == std::string_view::npos || line.find('.') != std::string_view::npos) {
+    return false;
+  }
+  int num_numbers = 0;
+  for (std::string& word : WordsOf(line)) {
+    if (std::isalpha(static_cast<unsigned char>(word[0]))) continue;
+    const size_t comma = word.find(',');
+    if (comma == 0 || comma + 1 == word.size()) return false;
+    if (comma != std::string::npos) word[comma] = '.';
+    double number = 0;
+    if (!ParseReal(word, &number)) return false;
+    ++num_numbers;
+  }
+  return num_numbers >= 2;
+}
+
+std::string RemedyForLine(std::string_view line, const char* otherwise) {
+  return HasDecimalCommas(line) ? "Its numbers have decimal commas: write them with points"
+                                : otherwise;
 }
 
 }  // namespace roomtex

@@ -78,6 +78,13 @@ std::vector<std::string> WordsOf(std::string_view line);
 // too small or too large.
 bool ParseReal(std::string_view word, double* number);
 
+// Commas stand in place of the decimal point, as in "1,5 2,5": of two words or more, besides those
+// that begin with a letter, all are numbers then, and none has a point.
+bool HasDecimalCommas(std::string_view line);
+// The remedy for a line of text that cannot be read: what is to be done about such commas, else
+// `otherwise`.
+std::string RemedyForLine(std::string_view line, const char* otherwise = kDamaged);
+
 // As core/text.h has it.
 inline std::string Quoted(std::string_view text) { return Quoted(std::string(text)); }
 

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/resource_limits.h"
+#include "core/text.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
 
@@ -103,8 +104,9 @@ LasHeader ReadLasHeader(const FileReader& file) {
     const double high = ValueAt<double>(&bytes[179 + 16 * static_cast<size_t>(k)]);
     const double low = ValueAt<double>(&bytes[187 + 16 * static_cast<size_t>(k)]);
     header.middle[k] = 0.5 * (low + high);
-    if (!(header.scale[k] > 0) || !(header.scale[k] < 1e6)) {
-      fail(131 + 8 * k, "the scale is no positive number");
+    // A negative one is unusual, but the format has only the product.
+    if (header.scale[k] == 0 || !(std::abs(header.scale[k]) < 1e6)) {
+      fail(131 + 8 * k, "the scale is " + Exact(header.scale[k]));
     }
     if (!(std::abs(header.shift[k]) < 1e12)) fail(155 + 8 * k, "the offset is no number");
   }

@@ -68,8 +68,8 @@ class ObjParser {
   }
 
  private:
-  [[noreturn]] void Fail(const std::string& finding) const {
-    throw InputError(file_.path(), LinePosition(lines_.line_number()), finding, kDamaged);
+  [[noreturn]] void Fail(const std::string& finding, const std::string& remedy = kDamaged) const {
+    throw InputError(file_.path(), LinePosition(lines_.line_number()), finding, remedy);
   }
 
   // A line that ends with a backslash goes on in the next one.
@@ -104,8 +104,9 @@ class ObjParser {
     Eigen::Vector3d point;
     for (int k = 0; k < 3; ++k) {
       const std::string_view word = TakeWord(&line);
-      if (!ParseReal(word, &point[k]))
-        Fail("is " + Quoted(whole) + ", expected v and three numbers");
+      if (!ParseReal(word, &point[k])) {
+        Fail("is " + Quoted(whole) + ", expected v and three numbers", RemedyForLine(whole));
+      }
     }
     if (scan_.points.size() >= static_cast<size_t>(std::numeric_limits<int>::max())) {
       throw InputError(file_.path(), LinePosition(lines_.line_number()),

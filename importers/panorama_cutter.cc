@@ -44,7 +44,11 @@ CutPanorama Describe(const fs::path& path, const FaceOptions& options) {
   const auto [width, height] = ReadPhotoSize(path.string());
   panorama.width = width;
   panorama.height = height;
-  if (!(width > 0) || !(std::abs(0.5 * width / height - 1) <= kMaxShapeError)) {
+  if (width <= 0 || height <= 0) {
+    throw InputError(path.string(), "", "is not a picture that can be read",
+                     "Export it again, or leave it out");
+  }
+  if (!(std::abs(0.5 * width / height - 1) <= kMaxShapeError)) {
     throw InputError(path.string(), "",
                      "has " + std::to_string(width) + " x " + std::to_string(height) +
                          " pixels, expected a panorama all around (equirectangular), twice as wide "
@@ -113,18 +117,24 @@ bool IsPanoramaInput(const std::string& input_path) {
   return fs::is_directory(input_path, error) || IsPhotoName(input_path);
 }
 
-std::vector<CutPanorama> CutPanoramas(const std::string& input_path,
-                                      const std::string& output_folder, const FaceOptions& options,
-                                      int num_threads, Progress* progress) {
-  const std::vector<fs::path> paths = FindPanoramas(input_path);
+std::vector<CutPanorama> DescribePanoramas(const std::string& input_path,
+                                           const FaceOptions& options) {
   std::vector<CutPanorama> panoramas;
   std::set<std::string> folders;
-  for (const fs::path& path : paths) {
+  for (const fs::path& path : FindPanoramas(input_path)) {
     panoramas.push_back(Describe(path, options));
     if (folders.insert(path.stem().string()).second) continue;
     throw InputError(path.string(), "", "has the name of another panorama, but for its ending",
                      "Give the panoramas names of their own");
   }
+  return panoramas;
+}
+
+std::vector<CutPanorama> CutPanoramas(const std::string& input_path,
+                                      const std::string& output_folder, const FaceOptions& options,
+                                      int num_threads, Progress* progress) {
+  const std::vector<fs::path> paths = FindPanoramas(input_path);
+  const std::vector<CutPanorama> panoramas = DescribePanoramas(input_path, options);
   OutputSet outputs(output_folder);
   progress->Stage("cut panoramas", static_cast<int>(paths.size()));
   for (size_t i = 0; i < paths.size(); ++i) {

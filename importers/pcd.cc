@@ -76,8 +76,10 @@ class PcdHeaderParser {
       }
       const std::vector<std::string> words = WordsOf(line);
       if (words.empty() || words[0][0] == '#') continue;
-      if (!ParseEntry(words))
-        throw Error("is " + Quoted(line) + ", which is no line of a PCD header");
+      if (!ParseEntry(words)) {
+        throw Error("is " + Quoted(line) + ", which is no line of a PCD header",
+                    RemedyForLine(line));
+      }
     }
     header_.data_offset = lines_.offset();
     CheckWhole();
@@ -85,8 +87,8 @@ class PcdHeaderParser {
   }
 
  private:
-  InputError Error(const std::string& finding) const {
-    return InputError(file_.path(), LinePosition(lines_.line_number()), finding, kDamaged);
+  InputError Error(const std::string& finding, const std::string& remedy = kDamaged) const {
+    return InputError(file_.path(), LinePosition(lines_.line_number()), finding, remedy);
   }
 
   bool ParseEntry(const std::vector<std::string>& words) {
@@ -317,17 +319,17 @@ uint32_t PackedColor(double value, char type) {
 
 void ReadAscii(const FileReader& file, const PcdHeader& header, PcdFiller* filler) {
   LineReader lines(file, header.data_offset);
+  std::string_view line;
   const auto error = [&](const std::string& finding) {
     return InputError(file.path(),
                       LinePosition(header.data_line + std::max(1L, lines.line_number())), finding,
-                      kDamaged);
+                      RemedyForLine(line));
   };
   const PcdField* const intensity = header.Find("intensity");
   const int64_t offsets[3] = {header.Find("x")->offset, header.Find("y")->offset,
                               header.Find("z")->offset};
   const PcdField* const color = PcdColor(header);
   std::vector<double> values(static_cast<size_t>(header.values_per_point));
-  std::string_view line;
   for (int64_t cell = 0; cell < header.width * header.height;) {
     if (!lines.Next(&line)) {
       throw error("the file ends after " + std::to_string(cell) + " of " +

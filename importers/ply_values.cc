@@ -32,7 +32,7 @@ class AsciiSource : public PlyValues {
     if (!ParseReal(rest_.substr(0, size), &value)) {
       throw InputError(path_, Position(),
                        "is " + Quoted(line_) + ", which lacks a number or holds something else",
-                       kDamaged);
+                       RemedyForLine(line_));
     }
     rest_.remove_prefix(size);
     return value;

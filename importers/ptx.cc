@@ -27,7 +27,14 @@ const char kNotPtx[] = "The file is damaged or not PTX";
 bool IsSeparator(char c) { return c == ' ' || c == '\t' || c == ',' || c == ';'; }
 
 // The numbers of a line; -1 if something in it is no number or there are more than `max_count`.
+// Commas stand between them, or are decimal ones.
 int ParseNumbers(std::string_view line, double* numbers, int max_count) {
+  std::string with_points;
+  if (HasDecimalCommas(line)) {
+    with_points = line;
+    std::replace(with_points.begin(), with_points.end(), ',', '.');
+    line = with_points;
+  }
   const char* at = line.data();
   const char* const end = at + line.size();
   int count = 0;

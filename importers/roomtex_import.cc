@@ -343,34 +343,60 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
               std::to_string(photos.posed.size()) + " with a pose\n");
 }
 
-// Says what the scans are, and writes nothing.
-void LookAtScans(const ImportOptions& options, const Command::Context& context) {
-  const std::vector<std::string>& paths = options.input_paths;
-  for (const std::string& path : paths) {
-    if (std::count(paths.begin(), paths.end(), path) > 1) {
+// One line per panorama of the input.
+std::string LinesOnPanoramas(const std::string& input_path,
+                             const std::vector<CutPanorama>& panoramas) {
+  std::error_code error;
+  const bool is_folder = fs::is_directory(input_path, error);
+  std::string lines;
+  for (const CutPanorama& one : panoramas) {
+    lines += (is_folder ? (fs::path(input_path) / one.name).string() : input_path) +
+             ": panorama, " + std::to_string(one.width) + " x " + std::to_string(one.height) +
+             " pixels\n";
+  }
+  return lines;
+}
+
+// Says what the inputs are, and writes nothing.
+void LookAtInputs(const ImportOptions& options, const Command::Context& context) {
+  CheckOutputs(options);
+  std::vector<std::string> scans;
+  std::string answer;
+  size_t num_panoramas = 0;
+  for (const std::string& path : options.input_paths) {
+    if (std::count(options.input_paths.begin(), options.input_paths.end(), path) > 1) {
       throw UsageError("--input_path " + path + " is given twice");
     }
-    if (!IsPanoramaInput(path)) continue;
-    std::error_code none;
-    if (fs::is_directory(path, none)) {
-      throw UsageError("--output_path is missing: the folder for the faces of the panoramas in " +
-                       path);
+    if (!IsPanoramaInput(path)) {
+      scans.push_back(path);
+      continue;
     }
-    context.progress.Note("of a panorama faces are made, with --output_path, the folder for them");
+    const std::vector<CutPanorama> panoramas = DescribePanoramas(path, options.faces);
+    num_panoramas += panoramas.size();
+    answer += LinesOnPanoramas(path, panoramas);
   }
-  CheckOutputs(options);
-  context.progress.Stage("read scan", static_cast<int>(paths.size()));
+  if (num_panoramas > 0) context.report["num_panoramas"] = num_panoramas;
+  if (scans.empty() && !options.scan_poses.empty()) {
+    throw UsageError("--scan_poses is for scans, and there are panoramas only");
+  }
+  if (scans.empty()) {
+    AnswerAtEnd(answer);
+    return;
+  }
+  context.progress.Stage("read scan", static_cast<int>(scans.size()));
+  constexpr double kKept = 0;  // of several scans: one at a time is held
+  const SampleWork work("looking at", kLookBytesPerSample, kKept, kLookBytesPerSample);
   const std::vector<CheckedFile> files =
-      CheckScans(paths, options.scan_poses, options.reader, &context.progress);
+      CheckScans(scans, options.scan_poses, options.reader, &context.progress);
   context.progress.Finish();
   for (const CheckedFile& file : files) {
     for (const std::string& note : file.notes) {
-      context.Warn(paths.size() > 1 ? file.path + ": " + note : note);
+      context.Warn(scans.size() > 1 ? file.path + ": " + note : note);
     }
   }
   const Json keys = ReportKeys(files);
   for (const auto& [key, value] : keys.items()) context.report[key] = value;
-  AnswerAtEnd(LinesOn(files));
+  AnswerAtEnd(answer + LinesOn(files));
 }
 
 void CheckUsage(const ImportOptions& options) {
@@ -395,7 +421,7 @@ void RunImport(const ImportOptions& options, const Command::Context& context) {
   CheckUsage(options);
   for (const char* key : kScanKeys) context.report[key] = nullptr;
   if (options.IsLook()) {
-    LookAtScans(options, context);
+    LookAtInputs(options, context);
     return;
   }
   if (IsPanoramaInput(options.input_path())) {
@@ -433,17 +459,19 @@ int main(int argc, char** argv) {
       "output_path", &options.output_paths,
       "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity image, .rtpi (RTPI "
       "3.0), .ptx, .e57, or points: .las, .xyz, .pts, .csv. Colours of the scan itself go where "
-      "the "
-      "format holds them (all but .png and .rtpi). Of panoramas, where it is required: the folder "
+      "the format holds them (all but .png and .rtpi). Of panoramas: the folder "
       "for their faces, panoramas.json (which face is which part of which panorama) and "
       "camera_options.txt (for colmap feature_extractor). Without it, and without --images_path, "
-      "the scan is only looked at: a line says what it is, and whether it has a pose.",
+      "the input is only looked at: a line says what a scan is, and whether it has a pose, or what "
+      "a panorama is.",
       Command::Kind::kOptional);
-  command.AddOutputPath("images_path", &options.images_path,
-                        "E57: folder for its photos, written as they are. Those with a pose also "
-                        "become a COLMAP model in its folder sparse, in the frame of the scans: "
-                        "what roomtex-texture takes as --input_path.",
-                        Command::Kind::kOptional);
+  command.AddOutputPath(
+      "images_path", &options.images_path,
+      "E57: folder for its photos, written as they are, one with a mask as a PNG that "
+      "is transparent where it shows nothing. Those with a pose also "
+      "become a COLMAP model in its folder sparse, in the frame of the scans: "
+      "what roomtex-texture takes as --input_path.",
+      Command::Kind::kOptional);
   command.AddInputPath("scan_poses", &options.scan_poses,
                        "Without --output_path: the poses of the scans, which are looked at as "
                        "roomtex-align reads them. Several scans need a pose each.",

@@ -44,9 +44,13 @@ std::string WithPlainMinus(std::string_view text) {
   return plain;
 }
 
-// The finite numbers at the beginning of the text, at most `count`.
+// The finite numbers at the beginning of the text, at most `count`. Commas stand between them, or
+// are decimal ones.
 std::vector<double> Numbers(std::string_view text, size_t count) {
-  const std::string plain = WithPlainMinus(text);
+  std::string plain = WithPlainMinus(text);
+  if (HasDecimalCommas(count == 1 ? plain + " 0" : plain)) {
+    std::replace(plain.begin(), plain.end(), ',', '.');
+  }
   std::vector<double> numbers;
   const char* at = plain.data();
   const char* const end = at + plain.size();

@@ -1,19 +1,12 @@
 #include "importers/scan_check.h"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 #include "importers/scan_poses.h"
 
 namespace roomtex {
 namespace {
-
-// What ScanPoses asks about a scan.
-struct Placeable {
-  int number_in_file = 1;
-  Eigen::Vector3d up_in_station;
-};
 
 CheckedScan Look(const Scan& scan) {
   CheckedScan checked;
@@ -71,20 +64,13 @@ std::vector<CheckedFile> CheckScans(const std::vector<std::string>& paths,
                                     Progress* progress) {
   ScanPoses poses(poses_path);
   std::vector<CheckedFile> files;
-  struct Missing {
-    std::string path;
-    int number, count;
-  };
-  std::optional<Missing> missing;  // the first without a pose
-  size_t num_scans = 0;
   for (const std::string& path : paths) {
     CheckedFile checked;
-    std::vector<Placeable> placeable;
+    std::vector<ScanPoses::Asked> asked;
     const ScanFile file = ReadScanFile(path, options, [&](std::vector<Scan>* of_file) {
       const Scan scan = std::exchange(of_file->back(), Scan());
       checked.scans.push_back(Look(scan));
-      placeable.push_back(
-          {scan.number_in_file, scan.scan_from_station.rotation.conjugate() * scan.up});
+      asked.push_back({path, scan.number_in_file, 1, UpInStation(scan)});
       if (checked.scans.size() == 1) checked.up_is_assumed = scan.up_is_assumed;
     });
     checked.path = path;
@@ -92,33 +78,28 @@ std::vector<CheckedFile> CheckScans(const std::vector<std::string>& paths,
     checked.byte_order = file.byte_order;
     checked.notes = file.notes;
     checked.up_axis = file.up_axis;
-    const int count = static_cast<int>(checked.scans.size());
-    num_scans += checked.scans.size();
-    for (size_t k = 0; k < checked.scans.size(); ++k) {
-      const int number = placeable[k].number_in_file;
-      checked.scans[k].name = count > 1 ? path + "#" + std::to_string(number) : path;
-      const bool is_placed =
-          poses.Take(path, number, count, placeable[k].up_in_station).has_value();
-      checked.scans[k].has_pose = is_placed || (file.CarriesPoses() && !poses.surveyed());
-      if (!checked.scans[k].has_pose && !missing) missing = Missing{path, number, count};
+    for (size_t k = 0; k < asked.size(); ++k) {
+      ScanPoses::Asked& scan = asked[k];
+      scan.count = static_cast<int>(asked.size());
+      scan.file_has_pose = file.CarriesPoses();
+      checked.scans[k].name = scan.count > 1 ? path + "#" + std::to_string(scan.number) : path;
+      checked.scans[k].has_pose = poses.IsPlaced(scan, poses.Take(scan));
     }
     files.push_back(std::move(checked));
     progress->Tick();
   }
-  poses.RequireAllTaken();
-  if (missing && (num_scans > 1 || poses.surveyed())) {
-    poses.ThrowMissing(missing->path, missing->number, missing->count, num_scans);
-  }
+  poses.RequireAllPlaced();
   return files;
 }
 
 Json ReportKeys(const std::vector<CheckedFile>& files) {
   CheckedScan total;
+  int64_t num_columns = 0;  // of clouds, a column is a point: all together are too many for an int
   Json scans = Json::array();
   for (const CheckedFile& file : files) {
     for (const CheckedScan& scan : file.scans) {
       scans.push_back(ReportOf(file, scan));
-      total.num_columns += scan.num_columns;
+      num_columns += scan.num_columns;
       total.num_rows = std::max(total.num_rows, scan.num_rows);
       total.num_samples += scan.num_samples;
       total.num_missing += scan.num_missing;
@@ -128,7 +109,7 @@ Json ReportKeys(const std::vector<CheckedFile>& files) {
     }
   }
   Json keys;
-  keys["num_columns"] = total.num_columns;
+  keys["num_columns"] = num_columns;
   keys["num_rows"] = total.num_rows;
   keys["num_samples"] = total.num_samples;
   keys["num_missing"] = total.num_missing;

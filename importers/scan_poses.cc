@@ -16,7 +16,8 @@ namespace {
 
 const char kFormat[] =
     "Expected \"NAME m00 ... m33\" (4x4, row by row), \"NAME qw qx qy qz tx ty tz\" or \"NAME geo "
-    "LATITUDE LONGITUDE HEIGHT HEADING\" (degrees, metres)";
+    "LATITUDE LONGITUDE HEIGHT HEADING\" (degrees, metres); a NAME with blanks stands in double "
+    "quotes";
 const char kGeoFormat[] =
     "Expected \"NAME geo LATITUDE LONGITUDE HEIGHT HEADING\": degrees, metres above the WGS84 "
     "ellipsoid, degrees clockwise from north";
@@ -156,17 +157,17 @@ void ScanPoses::AddEntry(Entry entry) {
 }
 
 // The path as it was given wins over the file name.
-ScanPoses::Entry* ScanPoses::Find(const std::string& scan_path, int number, int count) {
-  const std::string mark = "#" + std::to_string(number);
-  for (const std::string& name : {scan_path, FileName(scan_path)}) {
+ScanPoses::Entry* ScanPoses::Find(const Asked& scan) {
+  const std::string mark = "#" + std::to_string(scan.number);
+  for (const std::string& name : {scan.path, FileName(scan.path)}) {
     const auto numbered = entry_of_name_.find(name + mark);
     if (numbered != entry_of_name_.end()) return &entries_[numbered->second];
     const auto bare = entry_of_name_.find(name);
     if (bare == entry_of_name_.end()) continue;
     Entry& entry = entries_[bare->second];
-    if (count > 1) {
+    if (scan.count > 1) {
       throw InputError(path_, LinePosition(entry.line),
-                       entry.name + " holds " + std::to_string(count) + " scans",
+                       entry.name + " holds " + std::to_string(scan.count) + " scans",
                        "Give a pose per scan: " + entry.name + "#1, " + entry.name + "#2 ...");
     }
     return &entry;
@@ -174,21 +175,22 @@ ScanPoses::Entry* ScanPoses::Find(const std::string& scan_path, int number, int 
   return nullptr;
 }
 
-std::optional<ScanPoses::Placement> ScanPoses::Take(const std::string& scan_path, int number,
-                                                    int count,
-                                                    const Eigen::Vector3d& up_in_station) {
-  asked_for_.push_back(FileName(scan_path));
-  Entry* const entry = Find(scan_path, number, count);
-  if (entry == nullptr) return std::nullopt;
+std::optional<ScanPoses::Placement> ScanPoses::Take(const Asked& scan) {
+  asked_for_.push_back(FileName(scan.path));
+  Entry* const entry = Find(scan);
+  if (entry == nullptr) {
+    if (!unplaced_ && !IsPlaced(scan, std::nullopt)) unplaced_ = scan;
+    return std::nullopt;
+  }
   if (!entry->taken_by.empty()) {
     throw InputError(
         path_, LinePosition(entry->line),
-        entry->name + " is the name of two scans, " + entry->taken_by + " and " + scan_path,
-        "Write their paths, as given with --scan_path");
+        entry->name + " is the name of two scans, " + entry->taken_by + " and " + scan.path,
+        "Write their paths, as they are given to the command");
   }
-  entry->taken_by = scan_path;
+  entry->taken_by = scan.path;
   if (!entry->station) return Placement{entry->scan_from_station, std::nullopt};
-  return Placement{enu_->EnuFromStation(*entry->station, up_in_station), entry->station};
+  return Placement{enu_->EnuFromStation(*entry->station, scan.up_in_station), entry->station};
 }
 
 void ScanPoses::RequireAllTaken() const {
@@ -200,19 +202,21 @@ void ScanPoses::RequireAllTaken() const {
   }
 }
 
-void ScanPoses::ThrowMissing(const std::string& scan_path, int number, int count,
-                             size_t num_scans) const {
-  const std::string name = FileName(scan_path) + (count > 1 ? "#" + std::to_string(number) : "");
+void ScanPoses::RequireAllPlaced() const {
+  RequireAllTaken();
+  if (!unplaced_ || (asked_for_.size() == 1 && !surveyed())) return;
+  const std::string num_scans = std::to_string(asked_for_.size()) + " scans";
   if (path_.empty()) {
-    throw InputError(scan_path, "",
-                     "has no pose, but there are " + std::to_string(num_scans) + " scans",
+    throw InputError(unplaced_->path, "", "has no pose, but there are " + num_scans,
                      "Give each scan's pose with --scan_poses");
   }
+  const std::string name = FileName(unplaced_->path) +
+                           (unplaced_->count > 1 ? "#" + std::to_string(unplaced_->number) : "");
   std::vector<std::string> names;
   for (const Entry& entry : entries_) names.push_back(entry.name);
   throw InputError(path_, "",
                    std::string(surveyed() ? "gives no station" : "gives no pose") + " for " + name +
-                       ", one of " + std::to_string(num_scans) + " scans" +
+                       ", one of " + num_scans +
                        (names.empty() ? "" : "; it names " + Joined(names)),
                    "Add a line that begins with " + name);
 }

@@ -380,11 +380,6 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
   ScanPoses poses(poses_path);
   PlacedScans placed;
   placed.enu = poses.enu();
-  struct Missing {
-    std::string path;
-    int number, count;
-  };
-  std::vector<Missing> missing;
   ScanThinner thinner(max_samples, &placed.scans);
   const auto thin = [&thinner](std::vector<Scan>* of_file) { thinner.Take(of_file); };
   for (const std::string& path : paths) {
@@ -397,25 +392,19 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
     }
     for (int k = 0; k < count; ++k) {
       Scan& scan = file.scans[k];
-      const Eigen::Vector3d up_in_station = scan.scan_from_station.rotation.conjugate() * scan.up;
       const std::optional<ScanPoses::Placement> pose =
-          poses.Take(path, scan.number_in_file, count, up_in_station);
+          poses.Take({path, scan.number_in_file, count, UpInStation(scan), file.CarriesPoses()});
       read.placed.push_back(pose.has_value());
       if (pose) {
         PlaceScan(pose->scan_from_station, &scan);
         if (pose->station) placed.stations.push_back(*pose->station);
-      } else if (!file.CarriesPoses() || poses.surveyed()) {
-        missing.push_back({path, scan.number_in_file, count});
       }
       placed.scans.push_back(std::move(scan));
     }
     placed.files.push_back(std::move(read));
   }
   placed.stride = thinner.stride();
-  poses.RequireAllTaken();
-  if (!missing.empty() && (placed.scans.size() > 1 || poses.surveyed())) {
-    poses.ThrowMissing(missing[0].path, missing[0].number, missing[0].count, placed.scans.size());
-  }
+  poses.RequireAllPlaced();
   return placed;
 }
 

@@ -165,8 +165,8 @@ void CheckPoses(const AlignmentRecord& alignment, const std::vector<Found>& foun
     const int count = static_cast<int>(one.record->poses.size());
     for (int k = 0; k < count; ++k, ++scan) {
       const Rigid& known = one.record->poses[k].scan_from_station;
-      const Eigen::Vector3d up = known.rotation.conjugate() * scans[scan].up;
-      const auto said = poses.Take(one.path, k, count, up);
+      const auto said =
+          poses.Take({one.path, scans[scan].number_in_file, count, UpInStation(scans[scan])});
       if (!said) continue;
       const Rigid& now = said->scan_from_station;
       if ((now.translation - known.translation).norm() <= kSamePosition &&

@@ -168,13 +168,19 @@ std::optional<XyzColumns> XyzColumns::ByName(const std::vector<std::string_view>
     for (const char mark : {'"', '\'', '/', '#'}) {
       name.erase(std::remove(name.begin(), name.end(), mark), name.end());
     }
-    if (!name.empty()) names.push_back(LowerCase(name));
+    name = LowerCase(name);
+    // A unit, stuck to the name or a word by itself.
+    for (const std::string_view unit : {"[m]", "(m)"}) {
+      const size_t at = name.size() - std::min(unit.size(), name.size());
+      if (name.compare(at, std::string::npos, unit) == 0) name.erase(at);
+    }
+    if (!name.empty()) names.push_back(name);
   }
+  // The first of `wanted` that is there.
   const auto find = [&names](std::initializer_list<const char*> wanted) {
-    for (size_t i = 0; i < names.size(); ++i) {
-      if (std::find(wanted.begin(), wanted.end(), names[i]) != wanted.end()) {
-        return static_cast<int>(i);
-      }
+    for (const char* name : wanted) {
+      const auto found = std::find(names.begin(), names.end(), name);
+      if (found != names.end()) return static_cast<int>(found - names.begin());
     }
     return -1;
   };
@@ -183,8 +189,9 @@ std::optional<XyzColumns> XyzColumns::ByName(const std::vector<std::string_view>
   };
   XyzColumns columns;
   columns.count = names.size();
-  const char* const kAxes[] = {"x", "y", "z"};
-  for (int i = 0; i < 3; ++i) columns.place[i] = find({kAxes[i]});
+  columns.place[0] = find({"x", "easting", "east"});
+  columns.place[1] = find({"y", "northing", "north"});
+  columns.place[2] = find({"z", "elevation", "height"});
   if (*std::min_element(columns.place, columns.place + 3) < 0) return std::nullopt;
   columns.intensity = find({"intensity", "i", "scalar_intensity", "reflectance"});
   columns.color[0] = find({"r", "red"});

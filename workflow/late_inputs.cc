@@ -9,6 +9,7 @@
 #include "core/child_program.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/photo_files.h"
 #include "core/photo_fit.h"
 #include "core/text.h"
 #include "workflow/own_commands.h"
@@ -31,6 +32,11 @@ constexpr char kLook[] = "scans";  // how its log is called
 }  // namespace
 
 void RequireReadableScans(const Chain& chain) {
+  for (const std::string& path : chain.options().scan_paths) {
+    if (!IsPhotoName(path)) continue;  // such ones are panoramas to the command
+    throw InputError(path, "", "is a photo, expected a range scan",
+                     "Give photos with --image_path, panoramas with --panoramas_path");
+  }
   const std::string report_path = chain.ReportOf(kLook);
   std::error_code ignored;
   std::filesystem::remove(report_path, ignored);  // not there, or replaced

@@ -22,6 +22,7 @@
 #include "core/partial_path.h"
 #include "core/photo_files.h"
 #include "core/photo_fit.h"
+#include "core/standard_files.h"
 #include "workflow/auto_options.h"
 #include "workflow/chain.h"
 #include "workflow/output_folder.h"
@@ -192,8 +193,7 @@ void WriteReport(Chain* chain, const RunResult& result, const Command::Context& 
   // The report's own figure is of this program, which only waits for those of the steps.
   context.report["peak_memory_bytes"] = PeakMemoryWithPrograms();
   context.report.AddCopyOfAnyEnd(chain->At("report.json"));
-  std::printf("%s\n%s\n", verdict["headline"].get<std::string>().c_str(),
-              chain->At("report.html").c_str());
+  AnswerAtAnyEnd(verdict["headline"].get<std::string>() + "\n" + chain->At("report.html") + "\n");
 }
 
 void RunAll(AutoOptions options, const Command::Context& context) {

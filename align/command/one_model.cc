@@ -276,8 +276,8 @@ void BelieveWhatShowsTheSame(const AlignedPhotos& aligned, const SurveyedScans& 
     if (photo.lacks_sights) asked.insert(id);
   }
   if (asked.empty() || aligned.image_path.empty()) return;
-  for (const auto& [id, detail] :
-       CompareDetail(aligned, surveyed.viewer(), asked, doubtful, DetailOptions(), num_threads)) {
+  for (const auto& [id, detail] : CompareDetail(aligned, surveyed.viewer(), asked, doubtful,
+                                                PhotoDetailOptions(), num_threads)) {
     PhotoVerdict& photo = photos->at(id);
     photo.detail = detail;
     if (detail.Agrees()) photo.doubt.clear();

@@ -161,11 +161,9 @@ bool DetailAgreement::Agrees() const {
   return num_windows >= kMinWindows && Share() >= kLeastShare;
 }
 
-std::map<uint32_t, DetailAgreement> CompareDetail(const AlignedPhotos& aligned,
-                                                  const ScanViewer& viewer,
-                                                  const std::set<uint32_t>& asked,
-                                                  const std::set<uint32_t>& not_believed,
-                                                  const DetailOptions& options, int num_threads) {
+std::map<uint32_t, DetailAgreement> CompareDetail(
+    const AlignedPhotos& aligned, const ScanViewer& viewer, const std::set<uint32_t>& asked,
+    const std::set<uint32_t>& not_believed, const PhotoDetailOptions& options, int num_threads) {
   const PerspectiveViews views(aligned);
   std::map<uint32_t, const SparseImage*> images;
   for (const SparseImage* image : SpreadImages(views.model(), options.num_others)) {

@@ -23,7 +23,7 @@ struct DetailAgreement {
   bool Agrees() const;
 };
 
-struct DetailOptions {
+struct PhotoDetailOptions {
   int num_others = 48;      // photos that another is compared with, evenly taken from all
   int pixels_across = 400;  // of the views that are compared
 };
@@ -31,10 +31,8 @@ struct DetailOptions {
 // By image_id, of those in `asked` that are no panoramas and can be read. not_believed: photos that
 // others are not compared with. Photos are read small, a few side by side, and kept as some 100 000
 // cells each.
-std::map<uint32_t, DetailAgreement> CompareDetail(const AlignedPhotos& aligned,
-                                                  const ScanViewer& viewer,
-                                                  const std::set<uint32_t>& asked,
-                                                  const std::set<uint32_t>& not_believed,
-                                                  const DetailOptions& options, int num_threads);
+std::map<uint32_t, DetailAgreement> CompareDetail(
+    const AlignedPhotos& aligned, const ScanViewer& viewer, const std::set<uint32_t>& asked,
+    const std::set<uint32_t>& not_believed, const PhotoDetailOptions& options, int num_threads);
 
 }  // namespace roomtex

@@ -50,6 +50,35 @@ TEST_F(PhotoFile, IsReadSmallAndGrey) {
   EXPECT_INPUT_ERROR(ReadGreyPhoto(path_, 2), "ends before the picture does");
 }
 
+// 8 x 8 pixels of four inks, each 0 everywhere: baseline, each table with one code of one bit.
+std::string FourInks(bool adobe) {
+  std::string bytes("\xff\xd8", 2);
+  if (adobe)
+    bytes += std::string(
+        "\xff\xee\0\x0e"
+        "Adobe\0\x64\0\0\0\0\0",
+        16);
+  bytes += std::string("\xff\xdb\0\x43\0", 5) + std::string(64, '\x08');
+  bytes += std::string("\xff\xc0\0\x14\x08\0\x08\0\x08\x04", 10);
+  for (const char id : {1, 2, 3, 4}) bytes += std::string{id, '\x11', '\0'};
+  for (const char table : {'\0', '\x10'}) {  // DC: a difference of 8 bits; AC: the block ends
+    bytes += std::string("\xff\xc4\0\x14", 4) + table + '\x01' + std::string(15, '\0');
+    bytes += table == 0 ? '\x08' : '\0';
+  }
+  bytes += std::string("\xff\xda\0\x0e\x04", 5);
+  for (const char id : {1, 2, 3, 4}) bytes += std::string{id, '\0'};
+  bytes += std::string("\0\x3f\0", 3);
+  // Four times 0, then the 8 bits of -128, then 0.
+  return bytes + std::string("\x3f\x8f\xe3\xf8\xfe", 5) + "\xff\xd9";
+}
+
+TEST_F(PhotoFile, InksMustSayWhichWayRoundTheyAre) {
+  WriteBytes(path_, FourInks(true));  // Adobe's 0 is all ink
+  EXPECT_EQ(ReadPhoto(path_).at<cv::Vec3b>(4, 4), cv::Vec3b(0, 0, 0));
+  WriteBytes(path_, FourInks(false));
+  EXPECT_INPUT_ERROR(ReadPhoto(path_), "four inks (CMYK) that does not say which way round");
+}
+
 TEST_F(PhotoFile, OrientationIsNotApplied) {
   auto exif_image = Exiv2::ImageFactory::open(path_);
   exif_image->readMetadata();

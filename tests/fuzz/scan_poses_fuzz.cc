@@ -14,14 +14,14 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   for (const int count : {1, 2}) {
     try {
       roomtex::ScanPoses poses(file.path());
-      for (int i = 0; i < count; ++i) {
-        const auto placed = poses.Take("rooms/a.rtpi", i, count, Eigen::Vector3d::UnitZ());
+      for (int number = 1; number <= count; ++number) {
+        const auto placed = poses.Take({"rooms/a.rtpi", number, count, Eigen::Vector3d::UnitZ()});
         if (!placed) continue;
         const roomtex::Rigid& pose = placed->scan_from_station;
         if (!(std::abs(pose.rotation.norm() - 1) < 1e-3)) std::abort();
         if (!pose.translation.allFinite()) std::abort();
       }
-      poses.RequireAllTaken();
+      poses.RequireAllPlaced();
     } catch (const roomtex::InputError&) {
     }
   }

@@ -45,14 +45,16 @@ class E57Images : public testing::Test {
                        Element("translation", "Structure",
                                Float("x", t[0]) + Float("y", t[1]) + Float("z", t[2])));
   }
+  std::string Blob(const std::string& name, const std::string& bytes) {
+    return Element(name, "Blob", "",
+                   "fileOffset=\"" + std::to_string(file_.AddBlob(bytes)) + "\" length=\"" +
+                       std::to_string(bytes.size()) + "\"");
+  }
   void Add(const std::string& name, const std::string& kind, int width, int height,
            const std::string& pose, const std::string& more = "", bool png = true) {
     const std::string picture = Picture(width, height, png ? ".png" : ".jpg");
     pictures_.push_back(picture);
-    const uint64_t offset = file_.AddBlob(picture);
-    const std::string blob = Element(png ? "pngImage" : "jpegImage", "Blob", "",
-                                     "fileOffset=\"" + std::to_string(offset) + "\" length=\"" +
-                                         std::to_string(picture.size()) + "\"");
+    const std::string blob = Blob(png ? "pngImage" : "jpegImage", picture);
     images_ +=
         Element("vectorChild", "Structure",
                 Element("name", "String", name) + pose +
@@ -102,6 +104,44 @@ TEST_F(E57Images, PicturesComeOutAsTheyWentIn) {
   }
   EXPECT_THAT(photos.notes, SizeIs(3));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "photos/sparse"));
+}
+
+TEST_F(E57Images, WhereAMaskShowsNothingThePhotoIsTransparent) {
+  const auto mask = [this](int width, int height, int masked_columns) {
+    cv::Mat1b shown(height, width, uchar{1});
+    shown.colRange(0, masked_columns).setTo(0);
+    std::vector<uchar> bytes;
+    cv::imencode(".png", shown, bytes);
+    return Blob("imageMask", {bytes.begin(), bytes.end()});
+  };
+  Add("part", "pinhole", 80, 60, PoseXml(kUnturned, {0, 0, 0}),
+      Pinhole(0.02, 0.0005, 40, 30) + mask(80, 60, 30), false);
+  Add("all", "visualReference", 80, 60, "", mask(80, 60, 0), false);
+  Add("other", "visualReference", 80, 60, "", mask(8, 6, 2), false);
+  Add("around", "spherical", 200, 100, PoseXml(kUnturned, {0, 0, 0}), mask(200, 100, 100), false);
+  E57ImageOptions options;
+  options.cut_panoramas = true;
+  options.faces.around = 4;
+  const E57Photos photos = Extract(options);
+  ASSERT_THAT(photos.photos, SizeIs(4));
+  EXPECT_EQ(photos.photos[0].file, "part.png");
+  const cv::Mat picture = cv::imread(folder_ / "photos/part.png", cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(picture.type(), CV_8UC4);
+  EXPECT_EQ(picture.at<cv::Vec4b>(7, 29)[3], 0);
+  EXPECT_EQ(picture.at<cv::Vec4b>(7, 30)[3], 255);
+  EXPECT_NEAR(picture.at<cv::Vec4b>(7, 70)[1], 200, 4);
+  EXPECT_EQ(Model().images.size(), 5u);
+  // Nothing is masked, or the mask is none: byte by byte.
+  for (const int i : {1, 2}) {
+    EXPECT_EQ(ReadBytes(folder_ / ("photos/" + photos.photos[i].file)), pictures_[i]);
+  }
+  EXPECT_THAT(photos.notes, testing::Contains("other.jpg has a mask that does not fit it, which is "
+                                              "left out"));
+  // Faces: the first looks at the middle, the third at the seam.
+  const cv::Mat face = cv::imread(folder_ / "photos/around/face_1.png", cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(face.type(), CV_8UC4);
+  EXPECT_EQ(face.at<cv::Vec4b>(face.rows / 2, face.cols / 4)[3], 0);
+  EXPECT_EQ(face.at<cv::Vec4b>(face.rows / 2, 3 * face.cols / 4)[3], 255);
 }
 
 // A name of 100 bytes and more ends between two letters; what is no UTF-8 is none.

@@ -87,6 +87,16 @@ TEST_F(Las, ReadsEveryPointFormat) {
   }
 }
 
+TEST_F(Las, AScaleMayBeNegative) {
+  LasBytes file;
+  file.Make();
+  file.Put(131 + 8, -0.001);
+  const Scan scan = ReadLas(Write(file.bytes), {});
+  EXPECT_LT((scan.points[2] - Eigen::Vector3d(412007, 5653992, 109)).norm(), 1e-6);
+  file.Put(131 + 8, 0.0);
+  EXPECT_INPUT_ERROR(ReadLas(Write(file.bytes), {}), "byte 139: the scale is 0");
+}
+
 TEST_F(Las, WithheldPointsAreLeftOut) {
   LasBytes old;
   old.Make();
@@ -221,7 +231,7 @@ TEST_F(Las, BrokenFilesGetASentence) {
   expect({}, 107, 4, "says 4 points, the rest of the file holds 3");
   expect({}, 110, 255, "the rest of the file holds 3");
   expect({}, 107, 0, "holds no point");
-  expect({}, 138, 0xbf, "the scale is no positive number");
+  expect({}, 138, 0x7f, "byte 131: the scale is 1.797");
   expect({}, 162, 0x7f, "the offset is no number");
   const std::string whole = LasBytes().Make();
   for (size_t size = 0; size < whole.size(); size += 7) {

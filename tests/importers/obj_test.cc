@@ -108,6 +108,7 @@ TEST_F(Obj, RefusesBrokenFilesWithTheLine) {
   ExpectError("v 0 0\nf 1 1 1\n", "line 1");
   ExpectError("v 0 0 x\n", "expected v and three numbers");
   ExpectError("v 0 0 0x7\n", "expected v and three numbers");
+  ExpectError("v 1,5 0,25 2\n", "Its numbers have decimal commas: write them with points");
   ExpectError(v + "f 1 2\n", "line 5: a face has 2 corners");
   ExpectError(v + "f\n", "0 corners");
   ExpectError(v + "f 1 2 0\n", "from 1");

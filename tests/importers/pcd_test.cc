@@ -176,6 +176,10 @@ TEST_F(Pcd, TellsTheLineOrByteOfWhatIsWrong) {
   const std::string points = "1 2 3 4\n2 2 3 4\n3 2 3 4\n4 2 3 4\n";
   ASSERT_EQ(Read(Header(kAscii) + points).NumMissing(), 0);
   ExpectError(Header(kAscii) + "1 2 3 4\n2 2 x 4\n3 2 3 4\n4 2 3 4\n", "line 13: is \"2 2 x 4\"");
+  ExpectError(Header(kAscii) + "1 2 3 4\n2,5 2 0,5 4\n3 2 3 4\n4 2 3 4\n",
+              "expected 4 numbers. Its numbers have decimal commas: write them with points");
+  ExpectError(Header("WIDTH 2\nHEIGHT 2\nVIEWPOINT 0,5 0 0 1 0 0 0\nPOINTS 4\nDATA ascii\n"),
+              "no line of a PCD header. Its numbers have decimal commas");
   ExpectError(Header(kAscii) + "1 2 3 4\n2 2 3.25\n3 2 3 4\n4 2 3 4\n", "line 13");
   ExpectError(Header(kAscii) + "1 2 3 4 5\n2 2 3\n3 2 3 4\n4 2 3 4\n", "line 12");
   ExpectError(Header(kAscii) + points + "5 5 5 5\n", "line 16: is \"5 5 5 5\", expected the end");

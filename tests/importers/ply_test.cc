@@ -201,6 +201,12 @@ TEST_F(Ply, TellsTheLineOrByteOfWhatIsWrong) {
     EXPECT_NE(at, std::string::npos) << from;
     return bytes.replace(at, from.size(), to);
   };
+  ExpectError(
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0,5 1,5 2,5\n3 0 0 0\n",
+      "line 10: is \"0,5 1,5 2,5\", which lacks a number or holds something else. Its numbers have "
+      "decimal commas");
   for (int format = 0; format < 3; ++format) {
     ExpectError(with(format, "vertex 4", "vertex 1000000000"), "line 5: says 1000000000 of vertex");
     ExpectError(with(format, "face 2", "face 9000000000000000000"),

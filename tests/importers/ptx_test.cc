@@ -87,6 +87,22 @@ TEST_F(Ptx, AcceptsColoursTabsCarriageReturnsAndBlankLines) {
   EXPECT_THAT(scan.points[0], IsNearMatrix(Eigen::Vector3d(1, -2, 0.5), 0));
 }
 
+TEST_F(Ptx, CommasMayBeDecimal) {
+  const std::string header =
+      "1\n2\n10,5 20 30,25\n1,0 0,0 0,0\n0,0 1,0 0,0\n0,0 0,0 1,0\n1,0 0,0 0,0 0,0\n"
+      "0,0 1,0 0,0 0,0\n0,0 0,0 1,0 0,0\n10,5 20 30,25 1,0\n";
+  const Scan scan = Read(header + "1,5 -2,25 0 0,5\n1 0,5 -,5e0 0,25\n")[0];
+  EXPECT_THAT(scan.Station(), IsNearMatrix(Eigen::Vector3d(10.5, 20, 30.25), 0));
+  EXPECT_THAT(scan.points[1], IsNearMatrix(Eigen::Vector3d(12, 17.75, 30.25), 0));
+  EXPECT_EQ(scan.intensity[1], 0.5f);
+  EXPECT_THAT(scan.points[0], IsNearMatrix(Eigen::Vector3d(11.5, 20.5, 29.75), 0));
+  // Between numbers they are none.
+  EXPECT_THAT(Read(std::string("1\n1\n") + kIdentity + "1,2,3,0.5\n")[0].points[0],
+              IsNearMatrix(Eigen::Vector3d(1, 2, 3), 0));
+  EXPECT_THAT(Read(std::string("1\n1\n") + kIdentity + "1, 2, 3, 1\n")[0].points[0],
+              IsNearMatrix(Eigen::Vector3d(1, 2, 3), 0));
+}
+
 TEST_F(Ptx, ConvertsUnitsAndLeavesOutWhatIsTooFar) {
   PtxOptions options;
   options.meters_per_unit = 1e-3;

@@ -141,6 +141,23 @@ TEST_F(Rtpi, Version2IsWrittenAndReadBack) {
   }
 }
 
+TEST_F(Rtpi, CommasInTheHeaderMayBeDecimal) {
+  const std::string body = RtpiBody(MakeColumns(3, 4), false);
+  const RtpiHeader decimal =
+      Read(Rtpi3Header(3, 4,
+                       "# az_fov: -185,683 \xE2\x80\x93"
+                       "90,0503\n# curr_samples_per_degree_el: 16,6634\n# max_range: 240,125\n") +
+           body)
+          .header;
+  EXPECT_THAT(*decimal.az_fov, ElementsAre(-185.683, -90.0503));
+  EXPECT_EQ(*decimal.samples_per_degree_el, 16.6634);
+  EXPECT_EQ(*decimal.max_range, 240.125);
+  const RtpiHeader between =
+      Read(Rtpi3Header(3, 4, "# az_fov: -90, 95\n# el_fov: -50,60\n") + body).header;
+  EXPECT_THAT(*between.az_fov, ElementsAre(-90, 95));
+  EXPECT_THAT(*between.el_fov, ElementsAre(-50, 60));
+}
+
 TEST_F(Rtpi, ToleratesEveryOddityOfRealHeaders) {
   const std::string header =
       "RTPI_version_3.0\r\n# --begin_header--\r\n# GPS: unknown\r\n# camera:\r\n"

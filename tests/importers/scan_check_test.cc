@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "core/error.h"
 #include "tests/importers/rtpi_bytes.h"
@@ -100,6 +101,18 @@ TEST_F(ScanCheck, NothingOfSeveralFilesIsThatOfOne) {
   EXPECT_EQ(keys["scans"][2]["has_pose"], true);
 }
 
+TEST_F(ScanCheck, CloudsOfMoreThanAnIntAreCounted) {
+  CheckedFile cloud;
+  cloud.scans.resize(2);
+  for (CheckedScan& scan : cloud.scans) {
+    scan.num_columns = 2'000'000'000;
+    scan.num_samples = 2'000'000'000;
+  }
+  const Json keys = ReportKeys({cloud});
+  EXPECT_EQ(keys["num_columns"].get<int64_t>(), 4'000'000'000);
+  EXPECT_EQ(keys["num_samples"].get<int64_t>(), 4'000'000'000);
+}
+
 // The same words as where the scans are used.
 TEST_F(ScanCheck, RefusesWhatReadPlacedScansRefuses) {
   const std::string room = folder_ / "room.rtpi", again = folder_ / "again.rtpi";
@@ -153,9 +166,34 @@ TEST_F(ScanCheck, RefusesWhatReadPlacedScansRefuses) {
   EXPECT_THAT(result.out, IsEmpty());
 }
 
+TEST_F(ScanCheck, SaysWhatPanoramasAre) {
+  fs::create_directory(folder_ / "photos");
+  cv::imwrite(folder_ / "photos/a.png", cv::Mat3b(64, 128));
+  cv::imwrite(folder_ / "photos/b.png", cv::Mat3b(32, 64));
+  const std::string a = (folder_ / "photos/a.png") + ": panorama, 128 x 64 pixels\n";
+  const std::string b = (folder_ / "photos/b.png") + ": panorama, 64 x 32 pixels\n";
+  const CommandResult one = Run(Input("photos/a.png"));
+  EXPECT_EQ(one.exit_code, 0) << one.err;
+  EXPECT_EQ(one.out, a);
+  const CommandResult all =
+      Run(Input("room.rtpi") + Input("photos") + "--report_path " + (folder_ / "r.json"));
+  EXPECT_EQ(all.exit_code, 0) << all.err;
+  EXPECT_EQ(all.out, a + b + (folder_ / "room.rtpi") +
+                         ": RTPI, 12 columns x 9 rows, 106 samples, 2 missing, no pose\n");
+  const auto report = nlohmann::json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_EQ(report["num_panoramas"], 2);
+  EXPECT_EQ(report["num_samples"], 106);
+  cv::imwrite(folder_ / "photo.png", cv::Mat3b(60, 80));
+  const CommandResult photo = Run(Input("photo.png"));
+  EXPECT_EQ(photo.exit_code, 3);
+  EXPECT_THAT(photo.err, HasSubstr("has 80 x 60 pixels, expected a panorama all around"));
+  WriteBytes(folder_ / "photo.png", "none");
+  EXPECT_THAT(Run(Input("photo.png")).err, HasSubstr("photo.png: is not a picture that can be"));
+}
+
 TEST_F(ScanCheck, WhatIsOnlyForALookIsRefusedWithOutputs) {
   WriteBytes(folder_ / "poses.txt", "room.rtpi 1 0 0 0 0 0 0\n");
-  fs::create_directory(folder_ / "photos");
+  cv::imwrite(folder_ / "pano.png", cv::Mat3b(8, 16));
   const std::string output = "--output_path " + (folder_ / "o.ply") + " ";
   const std::pair<std::string, const char*> cases[] = {
       {Input("room.rtpi") + Input("two.ptx") + output, "--input_path is given 2 times"},
@@ -164,7 +202,7 @@ TEST_F(ScanCheck, WhatIsOnlyForALookIsRefusedWithOutputs) {
       {Input("room.rtpi") + Input("room.rtpi"), "is given twice"},
       {Input("room.rtpi") + "--max_range -1", "--max_range"},
       {Input("room.rtpi") + "--Mesh.max_edge_ratio 0.5", "--Mesh.max_edge_ratio"},
-      {Input("photos"), "--output_path is missing"},
+      {Input("pano.png") + "--scan_poses " + (folder_ / "poses.txt"), "there are panoramas only"},
       {Input("room.rtpi") + "--E57.picks 1", "give --images_path"}};
   for (const auto& [arguments, text] : cases) {
     const CommandResult result = Run(arguments);

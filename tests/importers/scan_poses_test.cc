@@ -47,7 +47,7 @@ TEST_F(ScanPosesFile, MatricesAndQuaternionsMayStandTogether) {
   EXPECT_FALSE(poses.surveyed());
   EXPECT_FALSE(poses.empty());
   const auto take = [&](const std::string& path, int number, int count) {
-    const auto placement = poses.Take(path, number, count, kYUp);
+    const auto placement = poses.Take({path, number, count, kYUp});
     EXPECT_TRUE(placement) << path;
     EXPECT_FALSE(placement && placement->station);
     return placement ? placement->scan_from_station : Rigid();
@@ -57,7 +57,7 @@ TEST_F(ScanPosesFile, MatricesAndQuaternionsMayStandTogether) {
   EXPECT_THAT(take("b.rtpi", 1, 1), IsNearRigid(Rigid{{half, 0, 0, half}, {10, 20, 30}}, 1e-7, 0));
   EXPECT_THAT(take("/x/room 2.rtpi", 1, 1) * Eigen::Vector3d(1, 2, 3),
               IsNearMatrix(Eigen::Vector3d(3, 1, 9), 1e-12));
-  EXPECT_FALSE(poses.Take("c.ptx", 1, 2, kYUp));
+  EXPECT_FALSE(poses.Take({"c.ptx", 1, 2, kYUp}));
   EXPECT_EQ(take("c.ptx", 2, 2).translation.z(), -1);
   poses.RequireAllTaken();
 }
@@ -71,8 +71,8 @@ TEST_F(ScanPosesFile, SurveyedStationsMakeTheScanFrameEastNorthUpAboutTheFirst) 
   EXPECT_EQ(poses.enu()->origin().latitude_deg, 47);
   EXPECT_EQ(poses.enu()->origin().height, 500);
   // Asked for in another order than they stand in the file: the frame stays the same.
-  const auto b = poses.Take("b.ptx", 1, 1, Eigen::Vector3d::UnitZ());
-  const auto a = poses.Take("a.rtpi", 1, 1, kYUp);
+  const auto b = poses.Take({"b.ptx", 1, 1, Eigen::Vector3d::UnitZ()});
+  const auto a = poses.Take({"a.rtpi", 1, 1, kYUp});
   ASSERT_TRUE(a && b);
   EXPECT_THAT(a->scan_from_station.translation, IsNearMatrix(Eigen::Vector3d(0, 0, 0), 1e-8));
   EXPECT_THAT(a->scan_from_station * Eigen::Vector3d(0, 0, -2),

@@ -173,6 +173,21 @@ TEST_F(ScanRecords, PosesAreRememberedToTheLastBit) {
   EXPECT_THROW(Read({}, {}, other), UsageError);
 }
 
+// The second station of three is empty, and counts.
+TEST_F(ScanRecords, PosesOfAFileWithSeveralScansAreTakenByTheirNumbers) {
+  const std::string start = "1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n";
+  const std::string path =
+      Write("scans/site.ptx", start + "0 0 0 1\n1 2 3 0.5\n" + start + "0 0 0 1\n0 0 0 0.5\n" +
+                                  start + "0 0 0 1\n3 2 1 0.5\n");
+  const std::string poses = Write("poses.txt",
+                                  "site.ptx#1 1 0 0 0 4 5 6\n"
+                                  "site.ptx#3 1 0 0 0 7 8 9\n");
+  Align({path}, {}, poses);
+  EXPECT_THAT(Read({}, {}, poses).scans[1].Station(), IsNearMatrix(Eigen::Vector3d(7, 8, 9), 0));
+  const std::string other = Write("other.txt", "site.ptx#3 1 0 0 0 4 5 6\n");
+  EXPECT_THROW(Read({}, {}, other), UsageError);
+}
+
 TEST_F(ScanRecords, OneScanOfAnE57IsRemembered) {
   const std::string path = Write("scans/site.e57", E57OfWalls({"hall", "attic", "roof"}));
   Align({path + "#roof", path + "#2"});

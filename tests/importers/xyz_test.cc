@@ -62,6 +62,15 @@ TEST_F(Xyz, NamesSayWhatTheColumnsAre) {
   EXPECT_THAT(scan.intensity, ElementsAre(7, 8));
 }
 
+TEST_F(Xyz, SurveyorsNamesAreNamesToo) {
+  for (const char* names :
+       {"Northing,Easting,Elevation", "north;east;height", "Y [m];X [m];Z [m]", "y(m),x(m),z(m)"}) {
+    const Scan scan = Read(names + std::string("\n2,1,3\n"));
+    EXPECT_THAT(scan.points[0], IsNearMatrix(Eigen::Vector3d(1, 2, 3), 0)) << names;
+  }
+  EXPECT_THAT(Read("height,x,y,z\n9,1,2,3\n").points[0], IsNearMatrix(Eigen::Vector3d(1, 2, 3), 0));
+}
+
 TEST_F(Xyz, WhatMarksACommentIsNoColumn) {
   for (const char* mark : {"# ", "#", "// ", "//"}) {
     const Scan scan = Read(mark + std::string("x y z intensity\n1 2 3 0.5\n"));

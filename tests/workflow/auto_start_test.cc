@@ -59,6 +59,8 @@ TEST_F(AutoStart, SaysWhatIsWrongWithTheScansBeforeTheFirstStep) {
   AddScan("again.xyz");
   ExpectRefused("--scan_path " + (folder_ / "empty.e57"), "empty.e57: is empty");
   ExpectRefused("--scan_path " + (folder_ / "cut.ptx"), "cut.ptx: ");
+  ExpectRefused("--scan_path " + (folder_ / "photos/a100.jpg"),
+                "a100.jpg: is a photo, expected a range scan");
   ExpectRefused(Scan() + "--scan_path " + (folder_ / "again.xyz"), "has no pose");
   WriteBytes(folder_ / "poses.txt", "room.xyz 1 0 0\n");
   ExpectRefused(Scan() + "--scan_path " + (folder_ / "again.xyz") + " --scan_poses " +
@@ -114,6 +116,16 @@ TEST_F(AutoStart, SaysWhatIsWrongWithThePicksBeforeTheFirstStep) {
              "# mine\n" + header + ",weight,label\n\na100.jpg,1,2,3,4,5,0,door # one\n");
   EXPECT_EQ(Run(Scan() + "--picks_path " + (folder_ / "picks.csv")).exit_code, 3);
   EXPECT_TRUE(HasBegun());
+}
+
+TEST_F(AutoStart, TellsItsVerdictOnceTheReportIsThere) {
+  EXPECT_THAT(Run(Scan()).out, HasSubstr("/report.html\n"));
+  EXPECT_TRUE(HasBegun());
+  fs::remove(folder_ / "result/report.json");
+  fs::create_directories(folder_ / "result/report.json/full");
+  const CommandResult result = Run(Scan());
+  EXPECT_THAT(result.err, HasSubstr("report.json: "));
+  EXPECT_EQ(result.out, "");
 }
 
 TEST_F(AutoStart, CountsTheMemoryOfTheProgramsThatItRuns) {

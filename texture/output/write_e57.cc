@@ -1,6 +1,7 @@
 #include "texture/output/write_e57.h"
 
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "core/camera_formulas.h"
 #include "core/photo.h"
@@ -15,6 +16,11 @@ constexpr int kPhotoJpegQuality = 95;
 E57Writer::Photo PhotoForE57(const PhotoView& view) {
   E57Writer::Photo photo{view.name, "", view.camera, view.cam_from_scan};
   cv::Mat picture = ReadPhoto(view.path, view.pixels);
+  const cv::Mat1b transparent = ReadTransparency(view.path, view.pixels);
+  if (!transparent.empty()) {
+    cv::cvtColor(picture, picture, cv::COLOR_BGR2BGRA);
+    cv::insertChannel(transparent == 0, picture, 3);
+  }
   const bool is_pinhole = view.camera.model == CameraModel::kPinhole ||
                           view.camera.model == CameraModel::kSimplePinhole;
   if (!is_pinhole && !view.camera.IsPanorama()) {
@@ -22,7 +28,8 @@ E57Writer::Photo PhotoForE57(const PhotoView& view) {
     picture = UndistortPhoto(picture, view.camera, photo.camera).picture;
   }
   std::vector<uchar> bytes;
-  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, kPhotoJpegQuality});
+  cv::imencode(transparent.empty() ? ".jpg" : ".png", picture, bytes,
+               {cv::IMWRITE_JPEG_QUALITY, kPhotoJpegQuality});
   photo.bytes.assign(bytes.begin(), bytes.end());
   return photo;
 }

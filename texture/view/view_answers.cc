@@ -135,8 +135,9 @@ Json ViewAnswers::Impl::Scene() {
   const ViewModel& model = content.model;
   Json pages = Json::array(), list = Json::array();
   for (size_t i = 0; i < model.images.size(); ++i) {
+    const ViewImage& image = model.images[i];
     pages.push_back(
-        {{"id", i}, {"width", model.images[i].width}, {"height", model.images[i].height}});
+        {{"id", i}, {"width", image.width}, {"height", image.height}, {"wrap", image.wrap}});
   }
   Eigen::AlignedBox3f box;
   for (size_t i = 0; i < made.size(); ++i) {
@@ -165,6 +166,9 @@ Json ViewAnswers::Impl::Scene() {
           {"num_vertices", model.is_cloud ? num_triangles : num_points},
           {"num_triangles", model.is_cloud ? 0 : num_triangles},
           {"pages", pages},
+          {"uv",
+           {{"low", {model.uv_low.x(), model.uv_low.y()}},
+            {"high", {model.uv_high.x(), model.uv_high.y()}}}},
           {"chunks", list},
           {"num_cameras", content.cameras.size()},
           {"num_photos", content.cameras.num_photos()},
@@ -235,6 +239,8 @@ void ViewAnswers::Impl::Prepare() {
     content.model.origin = whole.origin;
     content.model.up = whole.up;
     content.model.images = whole.images;
+    content.model.uv_low = whole.uv_low;
+    content.model.uv_high = whole.uv_high;
     content.model.is_cloud = whole.is_cloud;
     num_points = whole.points.size();
     num_triangles = whole.triangles.size();

@@ -30,8 +30,9 @@ struct ViewContent {
 // Questions are a word and values, as in a URL. Numbers are metres, `scan` frame, unless said; ids
 // count from 0.
 //   scene            {version, name, path, origin, up, bounds, num_vertices, num_triangles, pages:
-//                    [{id, width, height}], chunks: [{id, page (-1 = colours), supplement, min, max
-//                    (relative to origin), num_triangles, num_vertices, spacing}], num_cameras,
+//                    [{id, width, height, wrap (glTF's, of s and t)}], uv: {low, high} of what the
+//                    pieces have as 0 and 1, chunks: [{id, page (-1 = colours), supplement, min,
+//                    max (relative to origin), num_triangles, num_vertices, spacing}], num_cameras,
 //                    num_photos, num_points, warnings}
 //   chunk?id&level   level 0 = coarse, 1 = middle, 2 = everything; bytes of ViewChunks::Encode
 //   evidence         {available, reason, ...} of ViewEvidence::ToJson

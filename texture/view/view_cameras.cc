@@ -217,6 +217,8 @@ std::shared_ptr<const std::string> ViewCameras::PinholePhoto(int id, int max_siz
   if (!pinhole) return nullptr;
   const std::pair<int, int> key(id, -size);  // beside the photo as it is
   if (auto found = cache_->Find(key)) return found;
+  const std::lock_guard<std::mutex> one_at_a_time(cache_->decoding);
+  if (auto found = cache_->Find(key)) return found;
   const Camera& camera = model_.cameras.at(Image(id).camera_id);
   cv::Mat photo = ReadFittedPhoto(paths_[id], fits_[id], camera.width, camera.height);
   if (response != nullptr) response->ToSrgb(&photo);

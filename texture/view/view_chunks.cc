@@ -148,7 +148,9 @@ std::string EncodeWhole(const ViewModel& model, const Entry* entries, size_t pat
   }
   for (const uint32_t point : numbers.points) {
     if (textured) {
-      const uint16_t uv[2] = {Fraction(model.uv[point].x()), Fraction(model.uv[point].y())};
+      const Eigen::Array2f place =
+          (model.uv[point] - model.uv_low).array() / (model.uv_high - model.uv_low).array();
+      const uint16_t uv[2] = {Fraction(place.x()), Fraction(place.y())};
       Append(uv, 2, &bytes);
     } else {
       const auto& [r, g, b] = model.colors[point];

@@ -24,6 +24,8 @@ namespace {
 
 using json = Json;
 
+constexpr float kBeside =
+    1e-3f;  // of an image's side; no more than rounding puts a place beyond it
 const char kNotOurs[] = "Give a file of roomtex-texture, or save it without this";
 constexpr int kMaxDepth = 32;           // of nodes
 constexpr size_t kMaxJson = 256 << 20;  // bytes; ours have some thousand
@@ -118,6 +120,7 @@ class GlbReader {
     }
     for (const json& node : roots) AddNode(Index(node), scan_from_gltf, 0);
     AddPrimitives(has_supplement && ours);
+    BoundUv();
     if (model_.triangles.empty()) Fail("has no triangles", "Give what roomtex-texture wrote");
     model_.up = (scan_from_gltf.linear() * Eigen::Vector3d::UnitY()).normalized();
     Recentre();
@@ -354,17 +357,63 @@ class GlbReader {
     }
   }
 
-  // Index into images, -1 for a material without.
-  int PageOf(const json& primitive) const {
-    if (Member(primitive, "material").is_null()) return -1;
+  // Of the primitive's material; null for one without.
+  const json& TextureOf(const json& primitive) const {
+    static const json kNone;
+    if (Member(primitive, "material").is_null()) return kNone;
     const json& material = Object("materials", Number(primitive, "material", std::nullopt));
     const json& reference = Member(Member(material, "pbrMetallicRoughness"), "baseColorTexture");
-    if (reference.is_null()) return -1;
-    const json& texture = Object("textures", Number(reference, "index", std::nullopt));
+    if (reference.is_null()) return kNone;
+    return Object("textures", Number(reference, "index", std::nullopt));
+  }
+
+  // Index into images, -1 for a material without.
+  int PageOf(const json& primitive) const {
+    const json& texture = TextureOf(primitive);
+    if (texture.is_null()) return -1;
     const int64_t page = Number(texture, "source", std::nullopt);
     if (page >= static_cast<int64_t>(model_.images.size()))
       Fail("names an image that is not there");
     return static_cast<int>(page);
+  }
+
+  // What is seen beyond the sides of the primitive's texture: repeated, if nothing is said.
+  std::array<int, 2> WrapOf(const json& primitive) const {
+    std::array<int, 2> wrap = {ViewImage::kRepeat, ViewImage::kRepeat};
+    const json& texture = TextureOf(primitive);
+    if (Member(texture, "sampler").is_null()) return wrap;
+    const json& sampler = Object("samplers", Number(texture, "sampler", std::nullopt));
+    const char* const names[] = {"wrapS", "wrapT"};
+    for (size_t k = 0; k < 2; ++k) {
+      const int64_t number = Number(sampler, names[k], ViewImage::kRepeat);
+      if (number == ViewImage::kClamp || number == ViewImage::kMirror) {
+        wrap[k] = static_cast<int>(number);
+      }
+    }
+    return wrap;
+  }
+
+  void BoundUv() {
+    constexpr float kMostTimes = 1000;  // a repeated image
+    for (Eigen::Vector2f& uv : model_.uv) {
+      uv = uv.allFinite() ? uv.cwiseMax(-kMostTimes).cwiseMin(kMostTimes).eval()
+                          : Eigen::Vector2f::Zero().eval();
+      const Eigen::Array2f low = uv.array() + kBeside, high = uv.array() - kBeside;
+      model_.uv_low = model_.uv_low.cwiseMin(low.floor().matrix());
+      model_.uv_high = model_.uv_high.cwiseMax(high.ceil().matrix());
+    }
+  }
+
+  // Where the primitive shows more than the image once: else nothing of the other side is to shine
+  // through at its sides.
+  void TakeWrap(const json& primitive, int page, size_t first) {
+    const std::array<int, 2> wrap = WrapOf(primitive);
+    for (int k = 0; k < 2; ++k) {
+      const bool is_beyond = std::any_of(
+          model_.uv.begin() + static_cast<std::ptrdiff_t>(first), model_.uv.end(),
+          [k](const Eigen::Vector2f& uv) { return uv[k] < -kBeside || uv[k] > 1 + kBeside; });
+      if (is_beyond) model_.images[page].wrap[k] = wrap[k];
+    }
   }
 
   Elements Positions(const json& primitive) const {
@@ -428,6 +477,7 @@ class GlbReader {
     if (textured) model_.uv.resize(model_.points.size(), Eigen::Vector2f::Zero());
     if (plain) model_.colors.resize(model_.points.size(), {200, 200, 200});
     AddColors(attributes, page, positions.count);
+    if (page >= 0) TakeWrap(primitive, page, first);
     AddTriangles(primitive, first, page, found.scan_from_node.linear().determinant() < 0);
   }
 

@@ -19,6 +19,9 @@ struct ViewImage {
   std::shared_ptr<const std::string> bytes;  // PNG or JPEG
   std::string type;                          // "image/png" or "image/jpeg"
   int width = 0, height = 0;                 // texels, by the image's header
+  // glTF's numbers, which are those of OpenGL, of what is seen beyond its sides, along u and v.
+  static constexpr int kClamp = 33071, kRepeat = 10497, kMirror = 33648;
+  std::array<int, 2> wrap = {kClamp, kClamp};
 };
 
 struct ViewModel {
@@ -31,6 +34,8 @@ struct ViewModel {
   // One per point: a place in the image (glTF: 0, 0 = upper-left corner), and the colour where
   // there is no image, sRGB. Empty where no triangle needs them.
   std::vector<Eigen::Vector2f> uv;
+  // All uv lie between: 0 to 1 of files of ours, whole numbers of images that are repeated.
+  Eigen::Vector2f uv_low = Eigen::Vector2f::Zero(), uv_high = Eigen::Vector2f::Ones();
   std::vector<std::array<uint8_t, 3>> colors;
   // One per point: unit, of the surface around it (SmoothNormals); zero where there is none.
   std::vector<Eigen::Vector3f> normals;

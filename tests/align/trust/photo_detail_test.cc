@@ -37,7 +37,7 @@ TEST(PhotoDetail, PhotosOfTheRoomShowTheSameAndThoseOfAnotherDoNot) {
   const ScanViewer viewer(room.scans, free_space);
   const AlignedPhotos aligned{room.model, room.folder.path()};
   const auto compare = [&](int num_threads) {
-    return CompareDetail(aligned, viewer, {2, kAsked}, {kAsked}, DetailOptions(), num_threads);
+    return CompareDetail(aligned, viewer, {2, kAsked}, {kAsked}, PhotoDetailOptions(), num_threads);
   };
   for (const auto& [id, detail] : compare(2)) {
     EXPECT_GT(detail.num_windows, 150) << id;

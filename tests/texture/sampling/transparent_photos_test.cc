@@ -4,7 +4,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/photo.h"
+#include "importers/e57_images.h"
 #include "tests/texture/colored_room.h"
+#include "texture/output/write_e57.h"
 #include "texture/sampling/photo_mask.h"
 
 namespace roomtex {
@@ -48,6 +50,27 @@ TEST_F(TransparentPhotosTest, GiveNoColourWhereTheyAreTransparent) {
   EXPECT_GT(num_seen, now.rgb.size() / 2);
   EXPECT_LT(num_black, num_seen / 500);
   EXPECT_FALSE(MaskOfTransparency(ReadTransparency(photos[1].path, photos[1].pixels)));
+}
+
+// Undistorted with their pictures.
+TEST_F(TransparentPhotosTest, AreTransparentInAnE57) {
+  std::vector<PhotoView> photos = Photos(0, 0);
+  photos.resize(1);
+  cv::Mat4b cut(photos[0].camera.height, photos[0].camera.width, {90, 90, 90, 255});
+  cut.colRange(0, cut.cols / 2).setTo(0);
+  photos[0].path = *folder_ / "half.png";
+  photos[0].camera.model = CameraModel::kSimpleRadial;
+  photos[0].camera.params = {1.0 * cut.cols, 0.5 * cut.cols, 0.5 * cut.rows, -0.05};
+  ASSERT_TRUE(cv::imwrite(photos[0].path, cut));
+  WriteColoredE57({}, {}, &photos, *folder_ / "half.e57");
+  Progress quiet(true);
+  const E57Photos written = ExtractE57Images(*folder_ / "half.e57", *folder_ / "half", {}, &quiet);
+  ASSERT_EQ(written.photos.size(), 1u);
+  const cv::Mat picture =
+      cv::imread(*folder_ / ("half/" + written.photos[0].file), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(picture.type(), CV_8UC4);
+  EXPECT_EQ(picture.at<cv::Vec4b>(cut.rows / 2, cut.cols / 2 - 3)[3], 0);
+  EXPECT_EQ(picture.at<cv::Vec4b>(cut.rows / 2, cut.cols / 2 + 3), cv::Vec4b(90, 90, 90, 255));
 }
 
 }  // namespace

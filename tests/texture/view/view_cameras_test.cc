@@ -1,6 +1,9 @@
 #include "texture/view/view_cameras.h"
 
 #include <cstring>
+#include <memory>
+#include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
@@ -130,6 +133,19 @@ TEST_F(ViewCamerasOfTwo, PhotosComeInTheSizeAskedFor) {
   EXPECT_FALSE(cameras_.Photo(1, 200));
   EXPECT_THROW(cameras_.Photo(2, 200), UsageError);
   EXPECT_THROW(cameras_.Photo(-1, 200), UsageError);
+}
+
+// A page asks for all of a list at once.
+TEST_F(ViewCamerasOfTwo, WhoAsksWhileAPhotoIsMadeWaitsForIt) {
+  constexpr int kAsking = 6;
+  std::vector<std::shared_ptr<const std::string>> answers(kAsking);
+  std::vector<std::thread> threads;
+  for (auto& answer : answers) {
+    threads.emplace_back([this, &answer] { answer = cameras_.PinholePhoto(0, 400, nullptr); });
+  }
+  for (std::thread& thread : threads) thread.join();
+  ASSERT_TRUE(answers[0]);
+  for (const auto& answer : answers) EXPECT_EQ(answer, answers[0]);
 }
 
 TEST_F(ViewCamerasOfTwo, APhotoOfAnotherShapeIsRefused) {

@@ -6,16 +6,19 @@
 
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include "core/error.h"
 #include "core/json_text.h"
 #include "core/output_file.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/view/view_scene.h"
+#include "texture/view/view_answers.h"
 #include "texture/view/view_chunks.h"
 
 namespace roomtex {
 namespace {
+using testing::ElementsAre;
 
 // Largest distance from a vertex of the model's triangles to the nearest sample of the scan.
 double FarthestFromScan(const ViewModel& model, const Scan& scan) {
@@ -45,6 +48,55 @@ TEST(ViewModel, GlbComesBackInTheScanFrame) {
     EXPECT_NEAR(model.images[0].height, 40, 1);
     for (const int page : model.page_of_triangle) ASSERT_EQ(page, 0);
   }
+}
+
+// A glTF of others: a wall of tiles, seen three times beside each other and once from -0.5 on.
+TEST(ViewModel, ImagesAreRepeatedAsTheFileHasIt) {
+  const TempFolder folder;
+  std::vector<uchar> png;
+  cv::imencode(".png", cv::Mat3b(4, 4), png);
+  std::string bytes;
+  const float numbers[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, -0.5f, 3, -0.5f, 0, 0.5f};
+  bytes.assign(reinterpret_cast<const char*>(numbers), sizeof numbers);
+  bytes.append(png.begin(), png.end());
+  Json scene = Json::parse(R"({"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}],
+      "nodes": [{"mesh": 0}], "materials": [{"pbrMetallicRoughness":
+      {"baseColorTexture": {"index": 0}}}], "textures": [{"source": 0}],
+      "images": [{"bufferView": 2, "mimeType": "image/png"}], "meshes": [{"primitives":
+      [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}],
+      "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+      {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"}],
+      "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 36},
+      {"buffer": 0, "byteOffset": 36, "byteLength": 24}]})");
+  scene["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", 60}, {"byteLength", png.size()}});
+  scene["buffers"] = {{{"uri", "a.bin"}, {"byteLength", bytes.size()}}};
+  WriteBytes(folder / "a.bin", bytes);
+  const auto read = [&] {
+    WriteBytes(folder / "a.gltf", scene.dump());
+    return ReadViewModel(folder / "a.gltf");
+  };
+  const ViewModel model = read();
+  EXPECT_THAT(model.images.at(0).wrap, ElementsAre(ViewImage::kRepeat, ViewImage::kRepeat));
+  EXPECT_EQ(model.uv_low, Eigen::Vector2f(0, -1));
+  EXPECT_EQ(model.uv_high, Eigen::Vector2f(3, 1));
+  EXPECT_EQ(model.uv[1], Eigen::Vector2f(3, -0.5f));
+  ViewContent content;
+  content.model = model;
+  const ViewAnswers answers(std::move(content), 1, [] { return false; });
+  const Json told = answers.json().at("scene")({});
+  EXPECT_EQ(told["uv"], Json::parse(R"({"low": [0, -1], "high": [3, 1]})"));
+  EXPECT_EQ(told["pages"][0]["wrap"], Json({10497, 10497}));
+  scene["samplers"] = {{{"wrapS", ViewImage::kMirror}, {"wrapT", ViewImage::kClamp}}};
+  scene["textures"][0]["sampler"] = 0;
+  EXPECT_THAT(read().images.at(0).wrap, ElementsAre(ViewImage::kMirror, ViewImage::kClamp));
+  // Within its sides nothing of the other one shines through.
+  float* const uv = reinterpret_cast<float*>(&bytes[36]);
+  for (const int i : {1, 3}) uv[i] = 0;
+  uv[2] = 1;
+  WriteBytes(folder / "a.bin", bytes);
+  const ViewModel inside = read();
+  EXPECT_THAT(inside.images.at(0).wrap, ElementsAre(ViewImage::kClamp, ViewImage::kClamp));
+  EXPECT_EQ(inside.uv_high, Eigen::Vector2f(1, 1));
 }
 
 // The scene of roomtex-join: a room's file, whose bytes stay where they are.

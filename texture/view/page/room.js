@@ -104,8 +104,8 @@ class PageTexture {
         gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER,
         this.renderer.isSoftware ? gl.LINEAR_MIPMAP_NEAREST : gl.LINEAR_MIPMAP_LINEAR);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, this.page.wrap[0]);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, this.page.wrap[1]);
     const anisotropy = gl.getExtension('EXT_texture_filter_anisotropic');
     if (anisotropy && !this.renderer.isSoftware) {
       const most = gl.getParameter(anisotropy.MAX_TEXTURE_MAX_ANISOTROPY_EXT);
@@ -159,7 +159,7 @@ export class Room {
     this.group.quaternion.setFromUnitVectors(
         new THREE.Vector3(...scene.up).normalize(), new THREE.Vector3(0, 1, 0));
     this.group.updateMatrixWorld();
-    this.look = new SurfaceLook();
+    this.look = new SurfaceLook(scene.uv);
     this.materials = new Map();
     this.mode = 'colour';
     this.frontOnly = true;

@@ -81,6 +81,8 @@ const kVertex = `
 in vec4 tint;
 in vec4 evidence;
 uniform bool front_only;
+uniform vec2 uvLow;
+uniform vec2 uvHigh;
 out float v_facing;
 out vec2 v_uv;
 out vec3 v_color;
@@ -89,7 +91,7 @@ out vec4 v_evidence;
 out vec3 v_point;
 out vec3 v_normal;
 void main() {
-  v_uv = uv;
+  v_uv = mix(uvLow, uvHigh, uv);
   v_color = tint.rgb;
   // The shares of what is known, so that it does not mix with what is not.
   float known = 1.0 - evidence.w;
@@ -178,14 +180,19 @@ export class SurfaceLook {
     front_only: {value: true},
     high: {value: 1},
     unknown: {value: new THREE.Vector3(...kUnknownColor).divideScalar(255)},
+    uvLow: {value: new THREE.Vector2(0, 0)},
+    uvHigh: {value: new THREE.Vector2(1, 1)},
     ...lumigraphUniforms(),
   };
   #mark = {value: 0};  // share of kMarkColor in the supplement
   #materials = [];
   #viewDependent = false;
 
-  constructor() {
+  // uv: {low, high} of what the pieces have as 0 and 1.
+  constructor(uv) {
     this.#blank.needsUpdate = true;
+    this.#shared.uvLow.value.set(...uv.low);
+    this.#shared.uvHigh.value.set(...uv.high);
   }
 
   // textured: or in the colours of the points. supplement: what may be marked.
