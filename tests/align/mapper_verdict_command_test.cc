@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include <gmock/gmock.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "colmap_ext/mapper_verdict.h"
 #include "core/report.h"
@@ -27,9 +26,16 @@ const SimulatedCase& Photographed() {
   return one;
 }
 
+// Its photos, drawn once.
+std::string PhotosOf() {
+  static const TempFolder folder;
+  const std::string photos = folder / "photos";
+  if (!std::filesystem::exists(photos)) WritePhotos(*Photographed().room, photos);
+  return photos;
+}
+
 struct RefusedModel {
   explicit RefusedModel(const std::string& about) {
-    WritePhotos(*one.room, photos);
     const Json report = {{"num_reg_images", one.model.images.size()},
                          {"num_points", one.model.points.size()},
                          {"reasons", {{{"about", about}, {"reason", "two pairs contradict it."}}}}};
@@ -41,7 +47,7 @@ struct RefusedModel {
 
   const SimulatedCase& one = Photographed();
   CaseFolder files{one};
-  std::string photos = files.folder / "photos";
+  std::string photos = PhotosOf();
   std::string untrusted = files.output_path + ".untrusted";
 };
 
@@ -61,13 +67,15 @@ TEST(MapperVerdictCommand, OfTheCamerasMotionIsOverruledByPhotosThatShowTheScan)
 
 TEST(MapperVerdictCommand, OfTheCamerasMotionStandsWherePhotosShowSomethingElse) {
   const RefusedModel model("motion");
-  // Each photo under the name of the next one.
+  // Each photo under the name of the one before it.
+  const std::string others = model.files.folder / "others";
+  std::filesystem::create_directories(others);
   const int count = model.one.room->NumPhotos();
   for (int photo = 0; photo < count; ++photo) {
-    cv::imwrite(model.photos + "/" + model.one.room->PhotoName(photo),
-                model.one.room->RenderPhoto((photo + 1) % count));
+    std::filesystem::copy_file(model.photos + "/" + model.one.room->PhotoName((photo + 1) % count),
+                               others + "/" + model.one.room->PhotoName(photo));
   }
-  const CommandResult result = model.files.Align("--image_path " + model.photos);
+  const CommandResult result = model.files.Align("--image_path " + others);
   EXPECT_EQ(result.exit_code, 4);
   EXPECT_THAT(result.err, HasSubstr("two pairs contradict it."));
 }

@@ -37,6 +37,15 @@ SimulatedRoomOptions RoughScan(int seed) {
   return options;
 }
 
+// A room with the scan that a capture of another one is aligned to.
+struct OtherRoom {
+  explicit OtherRoom(const SimulatedRoomOptions& options) : room(options) {}
+
+  const SimulatedRoom room;
+  const std::vector<Scan> scans = {room.MakeScan(0)};
+  const FreeSpace seen{scans, 1000000};
+};
+
 // A capture of one room, to be aligned to its scan or to that of another one.
 struct Captured {
   explicit Captured(const SimulatedRoomOptions& options) : one(MakeCase(options, 6)), files(one) {
@@ -45,20 +54,18 @@ struct Captured {
 
   // With photos, to the scan of a room with the same walls, by picks of what lies there where the
   // photo has it.
-  CommandResult AlignToRoom(const SimulatedRoomOptions& options, const std::string& more = "") {
-    const SimulatedRoom other(options);
-    const std::vector<Scan> scans = {other.MakeScan(0)};
-    const FreeSpace seen(scans, 1000000);
+  CommandResult AlignTo(const OtherRoom& other, const std::string& more = "") {
     const int photo = one.room->BestPhotoForPicks();
-    const Rigid scan_from_cam = other.ScanFromRoom() * one.room->ScanFromRoom().Inverse() *
+    const Rigid scan_from_cam = other.room.ScanFromRoom() * one.room->ScanFromRoom().Inverse() *
                                 one.room->CamFromScan(photo).Inverse();
-    const CameraProjection projection(one.room->camera());
+    const Camera& camera = one.room->camera();
+    const CameraProjection projection(camera);
     std::vector<Pick> picks;
     for (const double x : {0.1, 0.5, 0.9}) {
       for (const double y : {0.15, 0.5, 0.85}) {
-        const Eigen::Vector2d x_in_img(x * options.photo_width, y * options.photo_height);
+        const Eigen::Vector2d x_in_img(x * camera.width, y * camera.height);
         const Eigen::Vector3d ray = projection.CamFromImg(x_in_img)->homogeneous().normalized();
-        const auto sight = seen.Look(scan_from_cam.translation, scan_from_cam.rotation * ray);
+        const auto sight = other.seen.Look(scan_from_cam.translation, scan_from_cam.rotation * ray);
         if (!sight) continue;
         picks.push_back({one.room->PhotoName(photo), x_in_img, sight->x_in_scan,
                          2 + static_cast<long>(picks.size())});
@@ -66,7 +73,7 @@ struct Captured {
     }
     EXPECT_GE(picks.size(), 6u);
     CaseFolder wrong(one);
-    WriteScan(scans[0], {}, wrong.scan_path);
+    WriteScan(other.scans[0], {}, wrong.scan_path);
     WritePicks(wrong.picks_path, picks);
     const CommandResult result = wrong.Align("--image_path " + image_path + more);
     report = Json::parse(ReadBytes(
@@ -98,11 +105,12 @@ TEST(PhotoEvidence, TellsTheRoomFromAnotherOneOfItsPlan) {
   EXPECT_GT(ShownShare(captured.report), 0.4);
   EXPECT_THAT(captured.report["warnings"].dump(), Not(HasSubstr("another room")));
 
-  const CommandResult wrong = captured.AlignToRoom(SmallPhotos(7));
+  const OtherRoom other(SmallPhotos(7));
+  const CommandResult wrong = captured.AlignTo(other);
   EXPECT_EQ(wrong.exit_code, 4) << wrong.err;
   EXPECT_LT(ShownShare(captured.report), 0.2);
   EXPECT_THAT(wrong.err, HasSubstr("as photos of another room with the same walls and furniture"));
-  const CommandResult told = captured.AlignToRoom(SmallPhotos(7), " --Trust.min_shown_share 0");
+  const CommandResult told = captured.AlignTo(other, " --Trust.min_shown_share 0");
   EXPECT_EQ(told.exit_code, 0) << told.err;
 }
 
@@ -119,7 +127,7 @@ TEST(PhotoEvidence, OverrulesPointsThatARoughScanLeavesFloating) {
           .position;
   EXPECT_LT(1000 * off, 3 * captured.report["expected_error"]["at_cameras_mm"].get<double>());
 
-  EXPECT_EQ(captured.AlignToRoom(RoughScan(28)).exit_code, 4);
+  EXPECT_EQ(captured.AlignTo(OtherRoom(RoughScan(28))).exit_code, 4);
 }
 
 // A depth camera that drifts has hardly any point within 5 cm of its scan in a large room: that is

@@ -89,8 +89,10 @@ export function serve(command, args) {
 }
 
 // A page that remembers what went wrong in it: errors() must be empty at the end of a test.
-export async function openPage(browser, url, {width = 1600, height = 1000} = {}) {
-  const page = await browser.newPage({viewport: {width, height}});
+// width, height: CSS pixels; each has deviceScaleFactor pixels of the screen.
+export async function openPage(
+    browser, url, {width = 1600, height = 1000, deviceScaleFactor = 1} = {}) {
+  const page = await browser.newPage({viewport: {width, height}, deviceScaleFactor});
   const errors = [];
   page.on('pageerror', (error) => errors.push(String(error)));
   page.on('console', (message) => {

@@ -29,8 +29,10 @@ async function onStreet(body, {scheme = 'light', size = {width: 1280, height: 80
   await page.emulateMedia({colorScheme: scheme});
   await page.waitForSelector('body[data-ready]');
   const file = () => JSON.parse(readFileSync(output, 'utf8'));
-  // A place of the top view on the screen.
+  // A place of the top view on the screen, once what was done before is drawn.
   const toScreen = async ([x, y]) => {
+    await page.evaluate(
+        () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
     const [scale, , , cx, cy] = (await page.getAttribute('#pane', 'data-view')).split(' ').map(Number);
     const box = await page.locator('#pane').boundingBox();
     return [box.x + box.width / 2 + (x - cx) * scale, box.y + box.height / 2 - (y - cy) * scale];

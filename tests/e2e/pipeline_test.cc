@@ -7,7 +7,7 @@
 #include "colmap_ext/sparse_model.h"
 #include "core/frames.h"
 #include "core/similarity.h"
-#include "tests/e2e/colmap_steps.h"
+#include "tests/e2e/furnished_capture.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
 
@@ -20,23 +20,15 @@ json ReadJson(const std::string& path) { return json::parse(ReadBytes(path)); }
 
 class Pipeline : public testing::Test {
  protected:
-  // All tests look at one run of the whole chain.
+  // All tests look at one run of the whole chain, from the matches on.
   static void SetUpTestSuite() {
     folder_ = new TempFolder;
-    const std::string capture = *folder_ / "capture";
-    simulate_ = RunCommandLine("roomtex-simulate --output_path " + capture +
-                               " --num_photos 14 --photo_width 960 --photo_height 640" +
-                               " --scan_columns 1000 --scan_rows 380");
-    ASSERT_EQ(simulate_.exit_code, 0) << simulate_.err;
-    // Fewer features than COLMAP makes of itself hold it as well: half of the time for the matches.
-    ExtractAndMatch(
-        *folder_ / "database.db", capture + "/photos",
-        "--SiftExtraction.max_num_features 2048 " + ReadBytes(capture + "/camera_options.txt"));
-    database_before_ = ReadBytes(*folder_ / "database.db");
-    mapper_ =
-        RunCommandLine("roomtex-mapper --database_path " + (*folder_ / "database.db") +
-                       " --image_path " + capture + "/photos --output_path " +
-                       (*folder_ / "sparse") + " --report_path " + (*folder_ / "mapper.json"));
+    const FurnishedCapture& made = FurnishedCapture::Get();
+    const std::string& capture = made.capture;
+    database_before_ = ReadBytes(made.database);
+    mapper_ = RunCommandLine("roomtex-mapper --database_path " + made.database + " --image_path " +
+                             capture + "/photos --output_path " + (*folder_ / "sparse") +
+                             " --report_path " + (*folder_ / "mapper.json"));
     align_ =
         RunCommandLine("roomtex-align --input_path " + (*folder_ / "sparse/0") + " --scan_path " +
                        capture + "/scan.rtpi --picks_path " + capture + "/picks.csv --image_path " +
@@ -54,13 +46,12 @@ class Pipeline : public testing::Test {
   }
 
   static TempFolder* folder_;
-  static CommandResult simulate_, mapper_, align_, texture_, evaluate_;
+  static CommandResult mapper_, align_, texture_, evaluate_;
   static std::string database_before_;
 };
 
 TempFolder* Pipeline::folder_ = nullptr;
-CommandResult Pipeline::simulate_, Pipeline::mapper_, Pipeline::align_, Pipeline::texture_,
-    Pipeline::evaluate_;
+CommandResult Pipeline::mapper_, Pipeline::align_, Pipeline::texture_, Pipeline::evaluate_;
 std::string Pipeline::database_before_;
 
 TEST_F(Pipeline, MapperRegistersEveryPhoto) {
@@ -74,7 +65,7 @@ TEST_F(Pipeline, MapperRegistersEveryPhoto) {
 }
 
 TEST_F(Pipeline, DatabaseOfTheUserStaysAsItWas) {
-  EXPECT_EQ(ReadBytes(*folder_ / "database.db"), database_before_);
+  EXPECT_EQ(ReadBytes(FurnishedCapture::Get().database), database_before_);
 }
 
 TEST_F(Pipeline, AlignedPosesAreNearTheTruth) {

@@ -3,12 +3,13 @@
 
 #include <filesystem>
 
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include "colmap_ext/sparse_model.h"
 #include "core/frames.h"
-#include "tests/e2e/colmap_steps.h"
+#include "tests/e2e/furnished_capture.h"
 #include "tests/support/matchers.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
@@ -23,7 +24,7 @@ using testing::Not;
 
 class ScannerPhotos : public testing::Test {
  protected:
-  static constexpr int kNumPhotos = 14, kNumOfScanner = 4;
+  static constexpr int kNumPhotos = FurnishedCapture::kNumPhotos, kNumOfScanner = 4;
 
   static std::string Path(const std::string& name) { return *folder_ / name; }
 
@@ -31,23 +32,20 @@ class ScannerPhotos : public testing::Test {
   // true poses into the E57, without distortion, and nobody else has them.
   static void SetUpTestSuite() {
     folder_ = new TempFolder;
-    const CommandResult simulated =
-        RunCommandLine("roomtex-simulate --quiet --output_path " + Path("capture") +
-                       " --num_photos 14 --photo_width 960 --photo_height 640 --scan_columns 1000 "
-                       "--scan_rows 380");
-    ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+    const FurnishedCapture& made = FurnishedCapture::Get();
+    fs::create_directory_symlink(made.capture, Path("capture"));
     truth_ = ReadSparseModel(Path("capture/truth"));
     SparseModel of_scanner = truth_;
-    std::string mine;
     fs::create_directories(Path("photos/mine"));
     int k = 0;
     for (const auto& [id, image] : truth_.images) {
       if (k++ % 4 == 1) continue;
       of_scanner.images.erase(id);
-      fs::rename(Path("capture/photos/" + image.name), Path("photos/mine/" + image.name));
-      mine += "mine/" + image.name + "\n";
+      fs::copy_file(Path("capture/photos/" + image.name), Path("photos/mine/" + image.name));
     }
     ASSERT_EQ(of_scanner.images.size(), kNumOfScanner);
+    fs::copy_file(made.database, Path("database.db"));
+    KeepMine(of_scanner);
     for (auto& [id, image] : of_scanner.images) image.points2d.clear(), image.point3d_ids.clear();
     of_scanner.points.clear();
     WriteSparseModel(of_scanner, Path("of_scanner"));
@@ -60,17 +58,35 @@ class ScannerPhotos : public testing::Test {
         RunCommandLine("roomtex-import --quiet --input_path " + Path("site/model.e57") +
                        " --images_path " + Path("photos/scanner"));
     ASSERT_EQ(extracted.exit_code, 0) << extracted.err;
-    WriteBytes(Path("mine.txt"), mine);
     std::string theirs;
     for (const auto& entry : fs::directory_iterator(Path("photos/scanner"))) {
       if (entry.is_regular_file()) theirs += "scanner/" + entry.path().filename().string() + "\n";
     }
     WriteBytes(Path("theirs.txt"), theirs);
-    const std::string some = "--SiftExtraction.max_num_features 2048 --image_list_path ";
-    ExtractFeatures(Path("database.db"), Path("photos"),
-                    some + Path("mine.txt") + " " + ReadBytes(Path("capture/camera_options.txt")));
+    // COLMAP leaves out the pairs that are matched already.
     ExtractAndMatch(Path("database.db"), Path("photos"),
-                    some + Path("theirs.txt") + " --ImageReader.single_camera 1");
+                    std::string(FurnishedCapture::kFeatures) + "--image_list_path " +
+                        Path("theirs.txt") + " --ImageReader.single_camera 1");
+  }
+  // Takes the scanner's photos out of the database; the others lie in a folder mine/ from now on.
+  static void KeepMine(const SparseModel& of_scanner) {
+    SQLite::Database database(Path("database.db"), SQLite::OPEN_READWRITE);
+    for (const auto& [id, image] : of_scanner.images) {
+      SQLite::Statement found(database, "SELECT image_id FROM images WHERE name = ?");
+      found.bind(1, image.name);
+      ASSERT_TRUE(found.executeStep()) << image.name;
+      const std::string image_id = std::to_string(found.getColumn(0).getInt64());
+      found.reset();
+      for (const char* table : {"images", "keypoints", "descriptors"}) {
+        database.exec("DELETE FROM " + std::string(table) + " WHERE image_id = " + image_id);
+      }
+      for (const char* table : {"matches", "two_view_geometries"}) {
+        // COLMAP's number of a pair: the smaller image_id times 2147483647 plus the larger one.
+        database.exec("DELETE FROM " + std::string(table) + " WHERE pair_id % 2147483647 = " +
+                      image_id + " OR pair_id / 2147483647 = " + image_id);
+      }
+    }
+    database.exec("UPDATE images SET name = 'mine/' || name");
   }
   static void TearDownTestSuite() {
     delete folder_;
