@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 
+#include "core/camera_formulas.h"
 #include "core/error.h"
 
 namespace roomtex {
@@ -52,11 +53,36 @@ LensLabels LabelsOf(const MatchedImages& images, const std::string& image_path) 
   return ReadLensLabels(names, image_path);
 }
 
+// What COLMAP makes of a focal length in EXIF: it calls it known, but a phone's is 2 to 5 % off,
+// and nothing is known of the rest. Nobody who calibrated a lens that may be distorted finds it
+// without any distortion and with its axis in the very middle.
+bool IsByExif(const Camera& camera) {
+  const bool may_be_distorted = camera.model != CameraModel::kSimplePinhole &&
+                                camera.model != CameraModel::kPinhole && !camera.IsPanorama();
+  if (!camera.has_prior_focal_length || !may_be_distorted) return false;
+  const size_t num_focal = camera_formulas::HasOneFocalLength(camera.model) ? 1 : 2;
+  const std::vector<double>& p = camera.params;
+  return p[0] == p[num_focal - 1] && p[num_focal] == 0.5 * camera.width &&
+         p[num_focal + 1] == 0.5 * camera.height &&
+         std::all_of(p.begin() + static_cast<std::ptrdiff_t>(num_focal) + 2, p.end(),
+                     [](double value) { return value == 0; });
+}
+
+// With the focal lengths that only EXIF tells as what they are, a start.
+std::map<uint32_t, Camera> CamerasOf(const MatchedImages& images, RefineIntrinsics refine) {
+  std::map<uint32_t, Camera> cameras = images.cameras();
+  if (refine != RefineIntrinsics::kAuto) return cameras;
+  for (auto& [id, camera] : cameras) {
+    if (IsByExif(camera)) camera.has_prior_focal_length = false;
+  }
+  return cameras;
+}
+
 LensPlan PlanLenses(const MatchedImages& images, const LensLabels& labels, const KnownPhotos& known,
                     RefineIntrinsics refine) {
-  LensPlan plan = refine == RefineIntrinsics::kNever
-                      ? LensPlan(images.cameras(), images.images())
-                      : LensPlan(images.cameras(), images.images(), labels);
+  const std::map<uint32_t, Camera> cameras = CamerasOf(images, refine);
+  LensPlan plan = refine == RefineIntrinsics::kNever ? LensPlan(cameras, images.images())
+                                                     : LensPlan(cameras, images.images(), labels);
   TellCameras(known, &plan);
   return plan;
 }

@@ -121,6 +121,35 @@ TEST_F(MapperLenses, StandInTheReportAsTheyWereToldAndWhetherTheyAreUsed) {
   }
 }
 
+// COLMAP calls a focal length known that it has from EXIF: of a camera that may be distorted, with
+// its axis in the very middle and no distortion, nobody has calibrated anything.
+TEST_F(MapperLenses, ByExifAreAStartAndNoCalibration) {
+  SimulatedViewsOptions options = RoomOptions(5);
+  options.distortion = false;
+  options.noise_px = 1;
+  views_ = SimulateViews(options);
+  Camera& camera = views_.cameras.at(1);
+  told_ = camera;
+  const double f = camera.MeanFocalLength();
+  const auto map = [&](double centre_off) {
+    camera.model = CameraModel::kOpenCv;
+    camera.params = {1.02 * f, 1.02 * f, 0.5 * camera.width + centre_off, 0.5 * camera.height, 0, 0,
+                     0,        0};
+    camera.has_prior_focal_length = true;
+    fs::remove(folder_ / "database.db");
+    fs::remove_all(folder_ / "sparse");
+    WriteSimulatedDatabase(views_, folder_.path());
+    const CommandResult result = Run("--Init.min_num_inliers 15");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return LensOfModel(1).MeanFocalLength();
+  };
+  const double found = map(0);
+  EXPECT_NE(found, 1.02 * f);
+  EXPECT_NEAR(found, f, 2 * Report()["cameras"][0]["focal_px"]["sigma"].get<double>());
+  // The photos know it to 0.8 %: too little to overrule who calibrated it.
+  EXPECT_EQ(map(0.25), 1.02 * f);
+}
+
 TEST_F(MapperLenses, StayAsToldWherePhotosCannotBeMappedWithTheLensFound) {
   SimulateWrongLens(6, 1.15);
   WriteScript("colmap-first-pass",
