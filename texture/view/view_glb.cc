@@ -2,8 +2,6 @@
 // is compared with the bytes of the binary part, images stay encoded for the browser, and numbers
 // are read in blocks, so that what lies in memory is the model alone.
 
-#include <cctype>
-#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -17,6 +15,7 @@
 #include "core/photo.h"
 #include "core/text.h"
 #include "importers/file_reader.h"
+#include "texture/view/gltf_elements.h"
 #include "texture/view/view_model.h"
 
 namespace roomtex {
@@ -24,68 +23,11 @@ namespace {
 
 using json = Json;
 
-constexpr float kBeside =
-    1e-3f;  // of an image's side; no more than rounding puts a place beyond it
+// Of an image's side: no more than rounding puts a place beyond it.
+constexpr float kBeside = 1e-3f;
 const char kNotOurs[] = "Give a file of roomtex-texture, or save it without this";
 constexpr int kMaxDepth = 32;           // of nodes
 constexpr size_t kMaxJson = 256 << 20;  // bytes; ours have some thousand
-
-// The numbers of one accessor as floats or indices, to be read from the first to the last.
-struct Elements {
-  const FileReader* file = nullptr;
-  int64_t begin = 0;  // in the file
-  size_t count = 0, stride = 0, size = 0;
-  int type = 0, components = 0;
-  bool normalized = false;
-  // What is in memory of it.
-  mutable std::vector<char> block;
-  mutable size_t first = 0, end = 0;
-
-  const char* At(size_t i) const {
-    if (i < first || i >= end) {
-      constexpr size_t kBlock = 1 << 20;  // bytes
-      first = i;
-      end = std::min(count, i + std::max<size_t>(kBlock / stride, 1));
-      block.resize((end - first - 1) * stride + size);
-      file->Read(begin + static_cast<int64_t>(first * stride), block.data(),
-                 static_cast<int64_t>(block.size()));
-    }
-    return block.data() + (i - first) * stride;
-  }
-  template <typename T>
-  T As(size_t i, int k) const {
-    T value;
-    std::memcpy(&value, At(i) + static_cast<size_t>(k) * sizeof(T), sizeof(T));
-    return value;
-  }
-  float Float(size_t i, int k) const {
-    switch (type) {
-      case 5121:
-        return static_cast<float>(As<uint8_t>(i, k)) / (normalized ? 255.0f : 1.0f);
-      case 5123:
-        return static_cast<float>(As<uint16_t>(i, k)) / (normalized ? 65535.0f : 1.0f);
-      default:
-        return As<float>(i, k);
-    }
-  }
-  uint32_t Index(size_t i) const {
-    return type == 5121   ? As<uint8_t>(i, 0)
-           : type == 5123 ? As<uint16_t>(i, 0)
-                          : As<uint32_t>(i, 0);
-  }
-};
-
-// The path that a link names (RFC 3986): "my%20room/model.glb" is "my room/model.glb".
-std::string PathOfLink(const std::string& link) {
-  std::string path;
-  for (size_t i = 0; i < link.size(); ++i) {
-    const bool is_code = link[i] == '%' && i + 2 < link.size() &&
-                         std::isxdigit(link[i + 1] & 255) && std::isxdigit(link[i + 2] & 255);
-    path += is_code ? static_cast<char>(std::stoi(link.substr(i + 1, 2), nullptr, 16)) : link[i];
-    if (is_code) i += 2;
-  }
-  return path;
-}
 
 // Triangles, where they stand.
 struct Primitive {
@@ -256,11 +198,11 @@ class GlbReader {
     return {all.file, all.begin + static_cast<int64_t>(offset), size};
   }
 
-  Elements ElementsOf(int64_t number) const {
+  GltfElements ElementsOf(int64_t number) const {
     const json& accessor = Object("accessors", number);
     if (!Member(accessor, "sparse").is_null()) Fail("has sparse accessors", kNotOurs);
     const Bytes of_view = View(Number(accessor, "bufferView", std::nullopt));
-    Elements elements;
+    GltfElements elements;
     elements.count = static_cast<size_t>(Number(accessor, "count", std::nullopt));
     elements.type = static_cast<int>(Number(accessor, "componentType", std::nullopt));
     elements.normalized = Member(accessor, "normalized") == true;
@@ -416,9 +358,9 @@ class GlbReader {
     }
   }
 
-  Elements Positions(const json& primitive) const {
+  GltfElements Positions(const json& primitive) const {
     const json& attributes = Member(primitive, "attributes");
-    Elements positions = ElementsOf(Number(attributes, "POSITION", std::nullopt));
+    GltfElements positions = ElementsOf(Number(attributes, "POSITION", std::nullopt));
     if (positions.components != 3 || positions.type != 5126)
       Fail("has positions that are no floats");
     return positions;
@@ -459,7 +401,7 @@ class GlbReader {
 
   void AddPrimitive(const Primitive& found, bool textured, bool plain) {
     const json& primitive = *found.triangles;
-    const Elements positions = Positions(primitive);
+    const GltfElements positions = Positions(primitive);
     const size_t first = model_.points.size();
     for (size_t i = 0; i < positions.count; ++i) {
       const Eigen::Vector3d p(positions.As<float>(i, 0), positions.As<float>(i, 1),
@@ -488,7 +430,7 @@ class GlbReader {
       if (page >= 0) Fail("has a texture without texture coordinates");
       return;
     }
-    const Elements values = ElementsOf(Number(attributes, name, std::nullopt));
+    const GltfElements values = ElementsOf(Number(attributes, name, std::nullopt));
     if (values.count != count || values.components < (page >= 0 ? 2 : 3)) {
       Fail(std::string("has another number of ") + name + " than of positions");
     }
@@ -505,7 +447,7 @@ class GlbReader {
 
   void AddTriangles(const json& primitive, size_t first, int page, bool mirrored) {
     const size_t num_points = model_.points.size() - first;
-    Elements indices;
+    GltfElements indices;
     const bool indexed = !Member(primitive, "indices").is_null();
     if (indexed) {
       indices = ElementsOf(Number(primitive, "indices", std::nullopt));
