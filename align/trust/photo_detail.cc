@@ -17,11 +17,11 @@
 namespace roomtex {
 namespace {
 
-constexpr float kUnseen = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNotSeen = std::numeric_limits<float>::quiet_NaN();
 // Bytes: where the mean of the channels is darker or brighter, it is clipped or only noise.
-constexpr float kDark = 4, kClipped = 250;
+constexpr float kTooDark = 4, kTooBright = 250;
 // A place is seen where the view is as deep, to so many metres and such a share of its depth.
-constexpr double kDepthTolerance = 0.02, kDepthShare = 0.02;
+constexpr double kSameDepth = 0.02, kSameDepthShare = 0.02;
 // Cells along a window's side, between the middles of windows, and of a window that must be seen.
 constexpr int kWindow = 9, kStep = 5, kMinSeen = 60;
 // Standard deviation over a window of the logarithm of what others show, at least.
@@ -38,7 +38,7 @@ constexpr int kMinWindows = 150;
 struct Looked {
   const SparseImage* image = nullptr;
   const LookSetup* camera = nullptr;
-  cv::Mat1f light;  // kUnseen where it is clipped, transparent or shows no smooth surface
+  cv::Mat1f light;  // kNotSeen where it is clipped, transparent or shows no smooth surface
   cv::Mat1f depth;
 };
 
@@ -53,12 +53,13 @@ Looked Look(const PerspectiveViews& views, const ScanViewer& viewer, const Spars
   ScanView view = camera.Look(viewer, image.cam_from_model);
   const cv::Mat still = views.Still(image, view, camera, *cells);
   views.LeaveOutTransparent(image, &view);
-  looked.light = cv::Mat1f(view.depth.size(), kUnseen);
+  looked.light = cv::Mat1f(view.depth.size(), kNotSeen);
   for (int y = 0; y < std::min(still.rows, view.depth.rows); ++y) {
     for (int x = 0; x < std::min(still.cols, view.depth.cols); ++x) {
       const cv::Vec3b& bytes = still.at<cv::Vec3b>(y, x);
       const float mean = static_cast<float>(bytes[0] + bytes[1] + bytes[2]) / 3;
-      if (view.valid(y, x) && mean > kDark && mean < kClipped) looked.light(y, x) = std::log(mean);
+      if (view.valid(y, x) && mean > kTooDark && mean < kTooBright)
+        looked.light(y, x) = std::log(mean);
     }
   }
   looked.depth = view.depth;
@@ -67,7 +68,7 @@ Looked Look(const PerspectiveViews& views, const ScanViewer& viewer, const Spars
 
 // What `other` shows at the cells of `photo`.
 cv::Mat1f SeenBy(const Looked& other, const Looked& photo) {
-  cv::Mat1f seen(photo.light.size(), kUnseen);
+  cv::Mat1f seen(photo.light.size(), kNotSeen);
   const Rigid scan_from_cam = photo.image->cam_from_model.Inverse();
   const int cell_px = photo.camera->cell_px;
   for (int y = 0; y < photo.light.rows; ++y) {
@@ -89,7 +90,7 @@ cv::Mat1f SeenBy(const Looked& other, const Looked& photo) {
       }
       const int i = static_cast<int>(column), j = static_cast<int>(row);
       if (std::abs(other.depth(j, i) - x_in_cam.z()) >
-          kDepthTolerance + kDepthShare * x_in_cam.z()) {
+          kSameDepth + kSameDepthShare * x_in_cam.z()) {
         continue;
       }
       const float u = static_cast<float>(column - i), v = static_cast<float>(row - j);
@@ -101,7 +102,7 @@ cv::Mat1f SeenBy(const Looked& other, const Looked& photo) {
 }
 
 // Makes it as bright as the photo, in the median of what both show.
-void MakeEven(const Looked& photo, cv::Mat1f* seen) {
+void MakeAsBright(const Looked& photo, cv::Mat1f* seen) {
   std::vector<float> above;
   for (int y = 0; y < seen->rows; ++y) {
     for (int x = 0; x < seen->cols; ++x) {
@@ -113,7 +114,7 @@ void MakeEven(const Looked& photo, cv::Mat1f* seen) {
 
 // The median over the others, where enough of them see it.
 cv::Mat1f MedianOf(const std::vector<cv::Mat1f>& seen, const cv::Size& size) {
-  cv::Mat1f median(size, kUnseen);
+  cv::Mat1f median(size, kNotSeen);
   std::vector<float> values;
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
@@ -198,7 +199,7 @@ std::map<uint32_t, DetailAgreement> CompareDetail(
         return;
       }
       seen[k] = SeenBy(other, photo);
-      MakeEven(photo, &seen[k]);
+      MakeAsBright(photo, &seen[k]);
     });
     seen.erase(
         std::remove_if(seen.begin(), seen.end(), [](const cv::Mat1f& one) { return one.empty(); }),
