@@ -53,18 +53,17 @@ LensLabels LabelsOf(const MatchedImages& images, const std::string& image_path) 
   return ReadLensLabels(names, image_path);
 }
 
-// What COLMAP makes of a focal length in EXIF: it calls it known, but a phone's is 2 to 5 % off,
-// and nothing is known of the rest. Nobody who calibrated a lens that may be distorted finds it
-// without any distortion and with its axis in the very middle.
+// What COLMAP makes of a focal length in EXIF. It calls it known, but that one is rounded to whole
+// millimetres on film, which COLMAP takes to be 35 mm wide instead of 36, and nothing is known of
+// the rest. Nobody who calibrated a lens that may be distorted finds it without any distortion and
+// with its axis in the very middle.
 bool IsByExif(const Camera& camera) {
-  const bool may_be_distorted = camera.model != CameraModel::kSimplePinhole &&
-                                camera.model != CameraModel::kPinhole && !camera.IsPanorama();
-  if (!camera.has_prior_focal_length || !may_be_distorted) return false;
-  const size_t num_focal = camera_formulas::HasOneFocalLength(camera.model) ? 1 : 2;
   const std::vector<double>& p = camera.params;
-  return p[0] == p[num_focal - 1] && p[num_focal] == 0.5 * camera.width &&
-         p[num_focal + 1] == 0.5 * camera.height &&
-         std::all_of(p.begin() + static_cast<std::ptrdiff_t>(num_focal) + 2, p.end(),
+  const auto num_linear = static_cast<size_t>(camera_formulas::NumLinearParams(camera.model));
+  if (!camera.has_prior_focal_length || p.size() <= num_linear) return false;
+  return p[0] == p[num_linear - 3] && p[num_linear - 2] == 0.5 * camera.width &&
+         p[num_linear - 1] == 0.5 * camera.height &&
+         std::all_of(p.begin() + static_cast<std::ptrdiff_t>(num_linear), p.end(),
                      [](double value) { return value == 0; });
 }
 

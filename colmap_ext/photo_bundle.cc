@@ -88,6 +88,7 @@ std::set<uint32_t> HeldImages(const ObservedPoints& observed) {
 // the scale, which photos leave open, and changes nothing else.
 struct ScaleHold {
   uint32_t image_id = 0;                            // the farther one
+  double distance = 0;                              // of the model
   Eigen::RowVector3d by = Eigen::Vector3d::Zero();  // its place, over the standard deviation
 };
 
@@ -96,12 +97,14 @@ ScaleHold FindScaleHold(const SparseModel& model, const std::set<uint32_t>& held
     return model.images.at(id).cam_from_model.TargetOriginInSource();
   };
   const Eigen::Vector3d first = place(*held.begin());
-  ScaleHold hold{*held.begin()};
+  ScaleHold hold;
+  hold.image_id = *held.begin();
   for (const uint32_t id : held) {
     if ((place(id) - first).norm() > (place(hold.image_id) - first).norm()) hold.image_id = id;
   }
   const Eigen::Vector3d apart = place(hold.image_id) - first;
-  if (apart.norm() > 0) hold.by = apart.transpose() / (kScaleShare * apart.squaredNorm());
+  hold.distance = apart.norm();
+  if (hold.distance > 0) hold.by = apart.transpose() / (kScaleShare * apart.squaredNorm());
   return hold;
 }
 
@@ -334,7 +337,7 @@ class PhotoNormal {
       if (offset != pose_offset_.end()) {
         normal->AddInformation(offset->second + 3, hold.by.transpose() * hold.by);
       }
-      AddPosePriors(1 / (kScaleShare * hold.by.norm()), normal);
+      AddPosePriors(hold.distance, normal);
     }
     for (size_t i = 0; i < lens_offset_.size(); ++i) {
       if (lens_offset_[i] < 0) continue;
@@ -363,6 +366,7 @@ class PhotoNormal {
   // so as only a part of the points is asked. No lens depends on that. extent: distance of the
   // farthest photo from the first.
   void AddPosePriors(double extent, ReducedNormal* normal) const {
+    if (!(extent > 0)) return;
     Eigen::Matrix<double, 6, 1> sigmas;
     sigmas << Eigen::Vector3d::Constant(kPoseSpread),
         Eigen::Vector3d::Constant(kPoseSpread * extent);

@@ -54,9 +54,9 @@ void AddOptions(MappingOptions* options, Command* command) {
   command->AddChoice(
       "refine_intrinsics", &options->refine_intrinsics, kRefineIntrinsicsWords,
       "Refine focal length and distortion: auto = of a calibrated camera where its photos "
-      "contradict "
-      "it, which is said, and of an uncalibrated one (prior_focal_length = 0) where they determine "
-      "it; 1 = always; 0 = never.");
+      "contradict it, which is said, and of an uncalibrated one (prior_focal_length = 0, or a "
+      "focal "
+      "length from EXIF without any distortion) where they determine it; 1 = always; 0 = never.");
   command->Add(FieldsOf(&options->init));
   command->Add(FieldsOf(&options->chain));
   command->AddBool(

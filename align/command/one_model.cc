@@ -309,11 +309,12 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(
                             SurfaceTolerance(a.alignment.trust, surveyed.patches()),
                             KeypointSigma(aligned), support, picked);
   for (const uint32_t id : ran_away) {
-    if (!photos.at(id).doubt.empty()) continue;
-    photos.at(id).doubt =
+    PhotoVerdict& photo = photos.at(id);
+    photo.lacks_sights = false;  // whatever it shows, its pose is not to be believed
+    if (!photo.doubt.empty()) continue;
+    photo.doubt =
         "its points want it elsewhere than the sparse model has it, so that it was not adjusted to "
         "the scan, and how far it is off is not known";
-    photos.at(id).lacks_sights = false;
   }
   BelieveWhatShowsTheSame(photographed, surveyed, context.options.num_threads, &photos);
   size_t num_doubtful = 0;

@@ -1,12 +1,16 @@
 #include "align/trust/perspective_views.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 
 #include <opencv2/imgproc.hpp>
 
 #include "align/trust/still_photo.h"
 #include "align/trust/transparent_parts.h"
 #include "core/panorama_faces.h"
+#include "core/photo.h"
 
 namespace roomtex {
 namespace {
@@ -105,6 +109,33 @@ cv::Mat PerspectiveViews::Still(const SparseImage& image, const ScanView& view,
   const auto motion = photos_.row_motions.find(image.image_id);
   if (motion == photos_.row_motions.end()) return picture;
   return WithStillRows(picture, view, camera, motion->second);
+}
+
+std::optional<PhotoAndView> PerspectiveViews::Look(const ScanViewer& viewer,
+                                                   const SparseImage& image,
+                                                   const LookSetup& camera,
+                                                   std::string* warning) const {
+  const auto cells = ReadCells(image, camera.cell_px, warning);
+  if (!cells) return std::nullopt;
+  PhotoAndView look;
+  look.view = camera.Look(viewer, image.cam_from_model);
+  look.cells = Still(image, look.view, camera, *cells);
+  LeaveOutTransparent(image, &look.view);
+  return look;
+}
+
+bool IsAsDeep(float view_depth, double depth) {
+  constexpr double kTolerance = 0.02, kShare = 0.02;
+  return view_depth > 0 && std::abs(view_depth - depth) <= kTolerance + kShare * depth;
+}
+
+float LogLight(const cv::Vec3b& bytes) {
+  // Bytes: darker is only noise, brighter is clipped.
+  constexpr int kDark = 2, kClipped = 253;
+  const auto [least, most] = std::minmax({bytes[0], bytes[1], bytes[2]});
+  if (least < kDark || most > kClipped) return std::numeric_limits<float>::quiet_NaN();
+  const std::array<float, 256>& linear = LinearFromSrgbByte();
+  return std::log((linear[bytes[0]] + linear[bytes[1]] + linear[bytes[2]]) / 3);
 }
 
 }  // namespace roomtex

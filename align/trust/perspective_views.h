@@ -15,6 +15,20 @@
 
 namespace roomtex {
 
+// A photo in cells of a view, and the view: what the scan shows of the same cells.
+struct PhotoAndView {
+  cv::Mat cells;  // 8-bit BGR, as if all rows had been read with the middle one
+  ScanView view;  // without what the photo does not show
+};
+
+// Whether a view shows what is `depth` deep, metres, where it is view_depth deep itself (0 = it
+// shows nothing): to 2 cm and 2 %.
+bool IsAsDeep(float view_depth, double depth);
+
+// Natural logarithm of the linear light of 8-bit BGR, mean of the channels, 0..1; NaN where one of
+// them is clipped or only noise.
+float LogLight(const cv::Vec3b& bytes);
+
 // The photos of a model in the scan frame.
 struct AlignedPhotos {
   const SparseModel& model;
@@ -36,6 +50,9 @@ class PerspectiveViews {
   // The same in cells, see ReadCellsOf().
   std::optional<cv::Mat> ReadCells(const SparseImage& image, int cell_px,
                                    std::string* warning) const;
+  // That, and what the scan shows there; camera: the image's.
+  std::optional<PhotoAndView> Look(const ScanViewer& viewer, const SparseImage& image,
+                                   const LookSetup& camera, std::string* warning) const;
   // Takes out of the view of an image what its photo does not show, being transparent there.
   void LeaveOutTransparent(const SparseImage& image, ScanView* view) const;
   // Either of them had its rows been read with the middle one; view: the image's, of that camera.

@@ -1,7 +1,6 @@
 #include "align/trust/photo_comparison.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -11,17 +10,12 @@
 #include "align/trust/perspective_views.h"
 #include "core/camera_model.h"
 #include "core/parallel.h"
-#include "core/photo.h"
 #include "core/statistics.h"
 
 namespace roomtex {
 namespace {
 
 constexpr float kUnseen = std::numeric_limits<float>::quiet_NaN();
-// Bytes: where a channel is darker or brighter, it is clipped or only noise.
-constexpr int kDark = 2, kClipped = 253;
-// A sample is seen where the view is as deep, to so many metres and such a share of its depth.
-constexpr double kDepthTolerance = 0.02, kDepthShare = 0.02;
 constexpr int kGainRounds = 5;
 
 std::vector<Eigen::Vector3d> SpreadSamples(const std::vector<Scan>& scans, int count) {
@@ -40,12 +34,10 @@ std::vector<Eigen::Vector3d> SpreadSamples(const std::vector<Scan>& scans, int c
   return samples;
 }
 
-// Natural logarithm of the linear light at every sample, mean of the channels; kUnseen where the
-// photo does not see it.
-std::vector<float> LightAt(const std::vector<Eigen::Vector3d>& samples, const cv::Mat& cells,
-                           const ScanView& view, const CameraProjection& projection,
-                           const Rigid& cam_from_scan) {
-  const std::array<float, 256>& linear = LinearFromSrgbByte();
+// LogLight() of a photo at every sample; kUnseen where it does not see it.
+std::vector<float> LightAt(const std::vector<Eigen::Vector3d>& samples, const PhotoAndView& look,
+                           const CameraProjection& projection, const Rigid& cam_from_scan) {
+  const ScanView& view = look.view;
   std::vector<float> light(samples.size(), kUnseen);
   for (size_t i = 0; i < samples.size(); ++i) {
     const Eigen::Vector3d x_in_cam = cam_from_scan * samples[i];
@@ -55,14 +47,9 @@ std::vector<float> LightAt(const std::vector<Eigen::Vector3d>& samples, const cv
     const double column = x_in_img->x() / view.cell_px, row = x_in_img->y() / view.cell_px;
     if (!(column >= 0 && column < view.depth.cols && row >= 0 && row < view.depth.rows)) continue;
     const int x = static_cast<int>(column), y = static_cast<int>(row);
-    if (!view.valid(y, x) ||
-        std::abs(view.depth(y, x) - x_in_cam.z()) > kDepthTolerance + kDepthShare * x_in_cam.z()) {
-      continue;
+    if (view.valid(y, x) && IsAsDeep(view.depth(y, x), x_in_cam.z())) {
+      light[i] = LogLight(look.cells.at<cv::Vec3b>(y, x));
     }
-    const cv::Vec3b& bytes = cells.at<cv::Vec3b>(y, x);
-    const auto [least, most] = std::minmax({bytes[0], bytes[1], bytes[2]});
-    if (least < kDark || most > kClipped) continue;
-    light[i] = std::log((linear[bytes[0]] + linear[bytes[1]] + linear[bytes[2]]) / 3);
   }
   return light;
 }
@@ -113,12 +100,8 @@ PhotoComparison ComparePhotosOnScan(const AlignedPhotos& aligned, const ScanView
     const LookSetup& camera = cameras.at(image.camera_id);
     light[k].assign(samples.size(), kUnseen);
     std::string ignored;  // MeasureAgreement() says it
-    const auto cells = views.ReadCells(image, camera.cell_px, &ignored);
-    if (!cells) return;
-    ScanView view = camera.Look(viewer, image.cam_from_model);
-    const cv::Mat still = views.Still(image, view, camera, *cells);
-    views.LeaveOutTransparent(image, &view);
-    light[k] = LightAt(samples, still, view, camera.projection, image.cam_from_model);
+    const auto look = views.Look(viewer, image, camera, &ignored);
+    if (look) light[k] = LightAt(samples, *look, camera.projection, image.cam_from_model);
   });
   MakeEven(&light);
 

@@ -3,14 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 
-#include "core/camera_model.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
 
@@ -18,51 +15,39 @@ namespace roomtex {
 namespace {
 
 constexpr float kNotSeen = std::numeric_limits<float>::quiet_NaN();
-// Bytes: where the mean of the channels is darker or brighter, it is clipped or only noise.
-constexpr float kTooDark = 4, kTooBright = 250;
-// A place is seen where the view is as deep, to so many metres and such a share of its depth.
-constexpr double kSameDepth = 0.02, kSameDepthShare = 0.02;
 // Cells along a window's side, between the middles of windows, and of a window that must be seen.
 constexpr int kWindow = 9, kStep = 5, kMinSeen = 60;
 // Standard deviation over a window of the logarithm of what others show, at least.
-constexpr double kLeastDetail = 0.08;
+constexpr double kLeastDetail = 0.16;
 constexpr double kAlike = 0.5;  // correlation
 constexpr size_t kMinOthers = 2;
-// Photos of another room with the same walls agree in 0.61 to 0.77 of 730 to 1140 windows (six, of
+// Photos of another room with the same walls agree in 0.62 to 0.78 of 700 to 1160 windows (six, of
 // three rooms); right ones in 0.88 to 1 (a room with 14 photos from everywhere, two stations; three
 // with 16), and right ones that find 5 and 7 % of what others found in 0.93 and 0.99.
 constexpr double kLeastShare = 0.9;
 constexpr int kMinWindows = 150;
 
-// A photo in cells: the logarithm of its brightness, and the scan's depth there.
+// A photo in cells.
 struct Looked {
   const SparseImage* image = nullptr;
   const LookSetup* camera = nullptr;
-  cv::Mat1f light;  // kNotSeen where it is clipped, transparent or shows no smooth surface
-  cv::Mat1f depth;
+  cv::Mat1f light;  // LogLight(), kNotSeen where no smooth surface is seen; empty = not read
+  cv::Mat1f depth;  // of its view
 };
 
 Looked Look(const PerspectiveViews& views, const ScanViewer& viewer, const SparseImage& image,
             const LookSetup& camera) {
-  Looked looked;
-  looked.image = &image;
-  looked.camera = &camera;
+  Looked looked{&image, &camera, {}, {}};
   std::string ignored;  // MeasureAgreement() says it
-  const auto cells = views.ReadCells(image, camera.cell_px, &ignored);
-  if (!cells) return looked;
-  ScanView view = camera.Look(viewer, image.cam_from_model);
-  const cv::Mat still = views.Still(image, view, camera, *cells);
-  views.LeaveOutTransparent(image, &view);
-  looked.light = cv::Mat1f(view.depth.size(), kNotSeen);
-  for (int y = 0; y < std::min(still.rows, view.depth.rows); ++y) {
-    for (int x = 0; x < std::min(still.cols, view.depth.cols); ++x) {
-      const cv::Vec3b& bytes = still.at<cv::Vec3b>(y, x);
-      const float mean = static_cast<float>(bytes[0] + bytes[1] + bytes[2]) / 3;
-      if (view.valid(y, x) && mean > kTooDark && mean < kTooBright)
-        looked.light(y, x) = std::log(mean);
+  auto look = views.Look(viewer, image, camera, &ignored);
+  if (!look) return looked;
+  looked.depth = look->view.depth;
+  looked.light = cv::Mat1f(looked.depth.size(), kNotSeen);
+  for (int y = 0; y < looked.light.rows; ++y) {
+    for (int x = 0; x < looked.light.cols; ++x) {
+      if (look->view.valid(y, x)) looked.light(y, x) = LogLight(look->cells.at<cv::Vec3b>(y, x));
     }
   }
-  looked.depth = view.depth;
   return looked;
 }
 
@@ -89,10 +74,7 @@ cv::Mat1f SeenBy(const Looked& other, const Looked& photo) {
         continue;
       }
       const int i = static_cast<int>(column), j = static_cast<int>(row);
-      if (std::abs(other.depth(j, i) - x_in_cam.z()) >
-          kSameDepth + kSameDepthShare * x_in_cam.z()) {
-        continue;
-      }
+      if (!IsAsDeep(other.depth(j, i), x_in_cam.z())) continue;
       const float u = static_cast<float>(column - i), v = static_cast<float>(row - j);
       seen(y, x) = (1 - v) * ((1 - u) * other.light(j, i) + u * other.light(j, i + 1)) +
                    v * ((1 - u) * other.light(j + 1, i) + u * other.light(j + 1, i + 1));
@@ -174,18 +156,17 @@ std::map<uint32_t, DetailAgreement> CompareDetail(
     const auto image = views.model().images.find(id);
     if (image != views.model().images.end()) images[id] = &image->second;
   }
-  std::map<uint32_t, std::unique_ptr<LookSetup>> cameras;
+  std::map<uint32_t, LookSetup> cameras;
   std::vector<const SparseImage*> all;
   for (const auto& [id, image] : images) {
     const Camera& camera = views.model().cameras.at(image->camera_id);
-    auto& setup = cameras[image->camera_id];
-    const int cell_px = std::max(1, std::max(camera.width, camera.height) / options.pixels_across);
-    if (!setup) setup = std::make_unique<LookSetup>(camera, viewer, cell_px);
+    cameras.try_emplace(image->camera_id, camera, viewer,
+                        std::max(1, std::max(camera.width, camera.height) / options.pixels_across));
     all.push_back(image);
   }
   std::vector<Looked> looked(all.size());
   ParallelFor(num_threads, 0, static_cast<int>(all.size()), [&](int k) {
-    looked[k] = Look(views, viewer, *all[k], *cameras.at(all[k]->camera_id));
+    looked[k] = Look(views, viewer, *all[k], cameras.at(all[k]->camera_id));
   });
 
   std::map<uint32_t, DetailAgreement> agreements;
