@@ -119,10 +119,10 @@ class SightingSearch {
       densities_.emplace(id, KeypointDensity(image, model.cameras.at(image.camera_id)));
     }
     const size_t asked = std::max(kMinPointsAsked, kPointsAskedPerPhoto * model.images.size());
-    const size_t stride = model.points.size() / asked + 1;
+    stride_ = model.points.size() / asked + 1;
     size_t next = 0;
     for (const auto& [id, point] : model.points) {
-      if (next++ % stride == 0) points_.push_back(&point);
+      if (next++ % stride_ == 0) points_.push_back(&point);
     }
   }
 
@@ -138,7 +138,7 @@ class SightingSearch {
       if (!x_in_img || !projection.InImage(*x_in_img)) continue;
       if (!IsOthersPoint(*point, image.image_id)) continue;
       std::vector<uint32_t> witnesses = Witnesses(*point, image.image_id, *x_in_img);
-      if (!witnesses.empty()) candidates.push_back({point, {*x_in_img, false, witnesses}});
+      if (!witnesses.empty()) candidates.push_back({point, {*x_in_img, false, witnesses, 1}});
     }
     std::vector<ExpectedSighting> in_sight;
     const size_t stride = candidates.size() / kPointsPerPhoto + 1;
@@ -149,6 +149,7 @@ class SightingSearch {
       candidate.sighting.is_found = std::any_of(
           track.begin(), track.end(),
           [&](const TrackElement& element) { return element.image_id == image.image_id; });
+      candidate.sighting.num_like = static_cast<double>(stride * stride_);
       in_sight.push_back(std::move(candidate.sighting));
     }
     return in_sight;
@@ -200,7 +201,8 @@ class SightingSearch {
   std::map<uint32_t, CameraProjection> projections_;  // by camera_id
   std::map<uint32_t, Eigen::Vector3d> centres_;
   std::map<uint32_t, KeypointDensity> densities_;
-  std::vector<const SparsePoint*> points_;
+  std::vector<const SparsePoint*> points_;  // every so many of the model's
+  size_t stride_ = 1;
 };
 
 }  // namespace
@@ -216,9 +218,17 @@ HidesPoint HiddenByOwnPoints(const SparseModel& model) {
 
 ExpectedSightings FindExpectedSightings(const SparseModel& model, const HidesPoint& hides,
                                         const std::set<uint32_t>& not_believed) {
+  std::set<uint32_t> all;
+  for (const auto& [id, image] : model.images) all.insert(id);
+  return FindExpectedSightings(model, hides, not_believed, all);
+}
+
+ExpectedSightings FindExpectedSightings(const SparseModel& model, const HidesPoint& hides,
+                                        const std::set<uint32_t>& not_believed,
+                                        const std::set<uint32_t>& asked) {
   const SightingSearch search(model, hides, not_believed);
   ExpectedSightings expected;
-  for (const auto& [id, image] : model.images) expected[id] = search.Of(image);
+  for (const uint32_t id : asked) expected[id] = search.Of(model.images.at(id));
   return expected;
 }
 

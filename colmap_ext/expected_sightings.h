@@ -23,6 +23,7 @@ struct ExpectedSighting {
   Eigen::Vector2d x_in_img = Eigen::Vector2d::Zero();
   bool is_found = false;            // the photo does show it
   std::vector<uint32_t> witnesses;  // other photos that saw it as this one would, by image_id
+  double num_like = 1;  // points of the model that it stands for, of which it was chosen
 };
 using ExpectedSightings = std::map<uint32_t, std::vector<ExpectedSighting>>;  // by image_id
 
@@ -34,10 +35,13 @@ using HidesPoint = std::function<bool(const SparseImage& image, const Eigen::Vec
 // model must outlive it.
 HidesPoint HiddenByOwnPoints(const SparseModel& model);
 
-// Of each photo of the model an even choice of at most some 400. What photos in `not_believed`
-// found, others need not show.
+// Of each photo of the model, or of those asked for, an even choice of at most some 400. What
+// photos in `not_believed` found, others need not show.
 ExpectedSightings FindExpectedSightings(const SparseModel& model, const HidesPoint& hides,
                                         const std::set<uint32_t>& not_believed);
+ExpectedSightings FindExpectedSightings(const SparseModel& model, const HidesPoint& hides,
+                                        const std::set<uint32_t>& not_believed,
+                                        const std::set<uint32_t>& asked);
 
 // How much of what a photo ought to show it does show. unevenness: how unevenly that lies over the
 // picture, chi-square per degree of freedom over cells: a blurred photo finds little anywhere, one

@@ -1,9 +1,32 @@
 #include "colmap_ext/view_chaining.h"
 
 #include <algorithm>
+#include <set>
+
+#include <fmt/core.h>
+
+#include "colmap_ext/expected_sightings.h"
 
 namespace roomtex {
 namespace {
+
+// Fewer points that a view ought to show and does not say nothing of it; more in common with the
+// model, of which only those of a pair are new to COLMAP's mapper, are no single thing.
+constexpr double kMinMissed = 20;
+constexpr int kManyShown = 100;
+
+// Points of an image that photos outside of `others` see, too.
+int NumInCommon(const SparseModel& model, const SparseImage& image,
+                const std::set<uint32_t>& others) {
+  return static_cast<int>(
+      std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(), [&](uint64_t point_id) {
+        if (point_id == kInvalidPoint3dId) return false;
+        const std::vector<TrackElement>& track = model.points.at(point_id).track;
+        return std::any_of(track.begin(), track.end(), [&](const TrackElement& element) {
+          return others.count(element.image_id) == 0;
+        });
+      }));
+}
 
 // Poses and cameras only, the views added.
 SparseModel WithViews(const SparseModel& model, const std::vector<ChainedView>& views,
@@ -31,7 +54,9 @@ bool SurerThan(const ChainedView& a, const ChainedView& b) {
 
 ViewChainer::ViewChainer(MatchedImages* images, const ChainOptions& options,
                          const HypothesisOptions& pair, int num_threads)
-    : images_(images), placer_(images, options, pair, num_threads) {}
+    : images_(images),
+      min_sight_share_(options.min_sight_share),
+      placer_(images, options, pair, num_threads) {}
 
 std::vector<ChainedView> ViewChainer::Place(const SparseModel& model,
                                             const std::map<uint32_t, std::string>& skip) {
@@ -50,6 +75,28 @@ std::map<uint32_t, std::string> ViewChainer::Check(const SparseModel& before,
   for (const ChainedView& view : views) {
     const std::string problem = placer_.ProblemOf(view, before, after);
     if (!problem.empty()) problems[view.image_id] = problem;
+  }
+  return problems;
+}
+
+std::map<uint32_t, std::string> ViewChainer::CheckSights(
+    const SparseModel& after, const std::vector<ChainedView>& views) const {
+  std::map<uint32_t, std::string> problems;
+  if (!(min_sight_share_ > 0)) return problems;
+  std::set<uint32_t> placed;
+  for (const ChainedView& view : views) placed.insert(view.image_id);
+  for (const auto& [id, sightings] :
+       FindExpectedSightings(after, HiddenByOwnPoints(after), placed, placed)) {
+    double num_missed = 0;
+    for (const ExpectedSighting& one : sightings) num_missed += one.is_found ? 0 : one.num_like;
+    const int num_shown = NumInCommon(after, after.images.at(id), placed);
+    if (num_missed < kMinMissed || num_shown >= kManyShown ||
+        num_shown >= min_sight_share_ * (num_shown + num_missed)) {
+      continue;
+    }
+    problems[id] = fmt::format(
+        "where its matches put it, it shows {} points that others found, and misses {:.0f}",
+        num_shown, num_missed);
   }
   return problems;
 }
@@ -79,6 +126,11 @@ ChainResult ViewChainer::Run(MapperResult start,
       problems = Check(chain.result.model, next.model, placed);
     } else {
       for (const ChainedView& view : placed) problems[view.image_id] = next.problem;
+    }
+    if (problems.empty()) {
+      const auto unseen = CheckSights(next.model, placed);
+      rejected.insert(unseen.begin(), unseen.end());
+      if (!unseen.empty()) continue;
     }
     if (problems.empty()) {
       chain.result = std::move(next);

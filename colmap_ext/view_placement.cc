@@ -79,6 +79,13 @@ void ChainOptions::Declare(OptionFields* fields) {
                "believed; larger = stricter.")
       .AtLeast(1);
   fields
+      ->Number("Chain.min_sight_share", &min_sight_share,
+               "Of the points that a photo so registered ought to have in common with the others "
+               "it must have this share, unless they are 100 and more: before a second cupboard of "
+               "the same make it has not. Larger = stricter, 0 = not asked.")
+      .AtLeast(0)
+      .AtMost(1);
+  fields
       ->Int("Chain.max_neighbors", &max_neighbors,
             "Registered neighbours that are tried per photo; larger = slower.")
       .AtLeast(1);

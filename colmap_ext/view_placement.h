@@ -28,6 +28,10 @@ struct ChainOptions {
   double max_scale_spread = 0.15;
   // As InitOptions::min_confidence, for two poses that both fit; larger = stricter.
   double min_confidence = 1.3;
+  // Of the points that the view and the photos before it have in common, or ought to
+  // (expected_sightings.h), the share that it must have, if they are few; larger = stricter, 0 =
+  // not asked. Measured: docs/colmap.md, "Photos of furniture of one make".
+  double min_sight_share = 0.35;
   int max_neighbors = 4;  // per view, those with most matches; larger = slower
 
   void Declare(OptionFields* fields);

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <set>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "colmap_ext/sparse_model.h"
+#include "tests/colmap_ext/lookalike_views.h"
 #include "tests/colmap_ext/simulated_database.h"
 #include "tests/colmap_ext/wall_sequence.h"
 #include "tests/support/run_command.h"
@@ -104,6 +107,51 @@ TEST_F(ChainingCommand, RejectsAPhotoWhoseTwoViewGeometryIsWrong) {
   const nlohmann::json report = Report();
   EXPECT_EQ(report["images"][7]["by"], "none");
   EXPECT_NE(report["images"][7]["reason"], "") << report["images"][7];
+}
+
+// Two cupboards of one make: what photos of one have in common with those of the other is enough
+// for a chain, and too little for COLMAP's mapper. The photos of each see each other well.
+SimulatedViews BeforeTwoCupboards(int random_seed) {
+  SimulatedViewsOptions options;
+  options.num_views = 12;
+  options.num_points = 1500;
+  options.baseline = 0.1;
+  options.random_seed = random_seed;
+  SimulatedViews views = SimulateViews(options);
+  ShowLookalikeRooms([](uint32_t image_id) { return image_id <= 7 ? 1 : 2; },
+                     [](const Eigen::Vector3d& x) { return x.norm() < 0.55; }, &views);
+  return views;
+}
+
+TEST_F(ChainingCommand, PhotosOfOneCupboardAreNotPutBeforeAnotherOfItsMake) {
+  for (const int seed : {0, 1}) {
+    SCOPED_TRACE(seed);
+    const SimulatedViews views = BeforeTwoCupboards(seed);
+    for (const DatabasePair& pair : views.pairs) {
+      if (pair.image_id1 <= 7 && pair.image_id2 > 7) {
+        ASSERT_GE(pair.matches.size(), 20u);
+        ASSERT_LE(pair.matches.size(), 29u);
+      }
+    }
+    // What takes whole rooms apart afterwards is another test's.
+    const CommandResult result = Run(views, "--Rooms.enabled 0");
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    std::map<int, std::set<bool>> cupboards;  // by model
+    const nlohmann::json report = Report();
+    for (const auto& image : report["images"]) {
+      if (image.contains("model")) {
+        cupboards[image["model"].get<int>()].insert(image["name"].get<std::string>() >= "view_007");
+      }
+    }
+    EXPECT_EQ(cupboards.size(), 2u);
+    for (const auto& [model, shown] : cupboards) EXPECT_EQ(shown.size(), 1u) << "model " << model;
+
+    if (seed > 0) continue;
+    // Not asked, the chain makes one model of both.
+    Run(views, "--Rooms.enabled 0 --Chain.min_sight_share 0");
+    EXPECT_EQ(Model().images.size(), 12u);
+    EXPECT_GT(Count("chained"), 0);
+  }
 }
 
 TEST_F(ChainingCommand, ListsEveryBadChainOption) {
