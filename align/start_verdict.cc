@@ -115,12 +115,11 @@ double ChanceWrong(const StartVerdict& verdict, double score, double min_score) 
 }
 
 // Directions that the surface leaves open: nothing that the points lie on faces that way.
-std::vector<Eigen::Vector3d> OpenSlides(const AlignmentInput& input, const StartSearch& search,
+std::vector<Eigen::Vector3d> OpenSlides(const ScanPatches& surface, const SearchCloud& cloud,
                                         const Similarity& scan_from_sparse) {
-  const ScanPatches& surface = input.surveyed.patches();
   Eigen::Matrix3d facing = Eigen::Matrix3d::Zero();
   int count = 0;
-  for (const SurfacePoint& point : search.cloud.points) {
+  for (const SurfacePoint& point : cloud.points) {
     const auto nearest =
         surface.FindNearest(scan_from_sparse * point.x_in_sparse, surface.cell_size());
     if (!nearest) continue;
@@ -220,8 +219,11 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   verdict.ratio = score / std::max({second, verdict.mirrored_score, 1e-6});
   const double min_score = alone ? options.min_score_alone : options.min_score;
   verdict.chance_wrong = ChanceWrong(verdict, score, options.min_score);
+  const ScanPatches& surface = input.surveyed.patches();
+  // One wall, or two that face each other, are their own mirror images, of another size.
   if (alone && verdict.mirrored_score >= min_score &&
-      verdict.mirrored_score >= options.min_ratio_mirrored * score) {
+      verdict.mirrored_score >= options.min_ratio_mirrored * score &&
+      OpenSlides(surface, Mirrored(search.cloud), search.mirrored[0].scan_from_sparse).empty()) {
     verdict.kind = Kind::kMirrored;
     verdict.reason = fmt::format(
         "The scan is a mirror image of the room: reflected, {} of the photos' rays meet its "
@@ -231,8 +233,8 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
     return verdict;
   }
   // What the surface leaves open the photos hold where they clearly confirm the place.
-  const auto open =
-      confirmed ? std::vector<Eigen::Vector3d>() : OpenSlides(input, search, best.scan_from_sparse);
+  const auto open = confirmed ? std::vector<Eigen::Vector3d>()
+                              : OpenSlides(surface, search.cloud, best.scan_from_sparse);
   if (!open.empty()) {
     verdict.kind = Kind::kOpen;
     verdict.reason = OpenReason(open) + kPicksRemedy;

@@ -18,9 +18,11 @@ namespace roomtex {
 namespace {
 
 // Photos that the others contradict are left out up to this share of all; of more, nobody knows
-// which are right.
+// which are right. Where more are doubtful the worst go first: a photo before the wrong one of two
+// shelves makes those doubtful that match it.
 constexpr double kMaxLeftOut = 0.2;
-constexpr int kMaxLeavings = 2;
+constexpr size_t kStepsIfMore = 4;
+constexpr int kMaxLeavings = 5;
 
 // Of some photos of a model, without points.
 SparseModel PosesOf(const SparseModel& model, const std::set<uint32_t>& photos) {
@@ -41,6 +43,8 @@ class PhotoParting {
 
   void Run() {
     pass_->check = Check(pass_->model());
+    max_left_out_ =
+        static_cast<size_t>(kMaxLeftOut * static_cast<double>(pass_->model().images.size()));
     for (int i = 0; i < kMaxLeavings && LeaveOutDoubtful(); ++i) {
       pass_->check = Check(pass_->model());
     }
@@ -66,6 +70,7 @@ class PhotoParting {
   const Database& database_;
   const KnownPhotos& known_;
   MappingPass* pass_;
+  size_t max_left_out_ = 0;  // photos that may be left out yet
 };
 
 ModelCheck PhotoParting::Check(const SparseModel& model) const {
@@ -81,14 +86,17 @@ ModelCheck PhotoParting::Check(const SparseModel& model) const {
 bool PhotoParting::LeaveOutDoubtful() {
   MappingOutcome& outcome = pass_->best[0];
   const ModelCheck& check = pass_->check;
-  const auto num_photos = static_cast<double>(pass_->model().images.size());
-  if (check.doubtful.empty() ||
-      static_cast<double>(check.doubtful.size()) > kMaxLeftOut * num_photos) {
-    return false;
+  std::vector<uint32_t> leaving = check.doubtful;
+  if (leaving.empty() || max_left_out_ == 0) return false;
+  if (leaving.size() > max_left_out_) {
+    std::stable_sort(leaving.begin(), leaving.end(), [&](uint32_t a, uint32_t b) {
+      return check.support.at(a) < check.support.at(b);
+    });
+    leaving.resize(std::max<size_t>(1, max_left_out_ / kStepsIfMore));
   }
   std::set<uint32_t> kept;
   for (const auto& [id, image] : pass_->model().images) kept.insert(id);
-  for (const uint32_t image_id : check.doubtful) kept.erase(image_id);
+  for (const uint32_t image_id : leaving) kept.erase(image_id);
   const SparseModel poses = PosesOf(pass_->model(), kept);
   MapperResult adjusted = pass_->mapper->Adjust(poses);
   if (!adjusted.problem.empty() || adjusted.model.images.size() != poses.images.size()) {
@@ -96,7 +104,8 @@ bool PhotoParting::LeaveOutDoubtful() {
   }
   adjusted.grew = outcome.result.grew;
   outcome.result = std::move(adjusted);
-  for (const uint32_t image_id : check.doubtful) {
+  max_left_out_ -= leaving.size();
+  for (const uint32_t image_id : leaving) {
     const std::string share = Percent(check.support.at(image_id));
     outcome.reasons[image_id] = "stood where only " + share + " of its own matches put it";
     context_.Warn(NameOf(image_id) + " is left out: only " + share +
