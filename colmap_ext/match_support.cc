@@ -25,10 +25,10 @@ Rigid ModelMotion(const SparseModel& model, const DatabasePair& pair) {
   return motion;
 }
 
-std::map<uint32_t, double> MatchSupport(MatchedImages* images, const SparseModel& model,
-                                        const HypothesisOptions& pair_options) {
+std::map<uint32_t, MatchCount> CountObeyingMatches(MatchedImages* images, const SparseModel& model,
+                                                   const HypothesisOptions& pair_options) {
   const double limit2 = std::pow(kPoseErrorFactor * pair_options.MaxEpipolarErrorPx(), 2);
-  std::map<uint32_t, std::pair<size_t, size_t>> obeying_of_all;
+  std::map<uint32_t, MatchCount> counts;
   for (const DatabasePair& pair : images->pairs()) {
     if (static_cast<int>(pair.matches.size()) < pair_options.min_num_inliers) continue;
     if (model.images.count(pair.image_id1) == 0 || model.images.count(pair.image_id2) == 0) {
@@ -39,17 +39,13 @@ std::map<uint32_t, double> MatchSupport(MatchedImages* images, const SparseModel
     const auto num_obeying = std::count_if(
         matches.begin(), matches.end(),
         [&](const RayMatch& match) { return EpipolarError2(essential, match) < limit2; });
+    if (matches.empty()) continue;
     for (const uint32_t image_id : {pair.image_id1, pair.image_id2}) {
-      obeying_of_all[image_id].first += static_cast<size_t>(num_obeying);
-      obeying_of_all[image_id].second += matches.size();
+      counts[image_id].num_obeying += static_cast<size_t>(num_obeying);
+      counts[image_id].num_matches += matches.size();
     }
   }
-  std::map<uint32_t, double> support;
-  for (const auto& [image_id, counts] : obeying_of_all) {
-    if (counts.second == 0) continue;
-    support[image_id] = static_cast<double>(counts.first) / static_cast<double>(counts.second);
-  }
-  return support;
+  return counts;
 }
 
 std::map<uint32_t, double> MatchSupport(const Database& database, const SparseModel& model,
@@ -76,8 +72,8 @@ std::map<uint32_t, double> MatchSupport(const Database& database, const SparseMo
   MatchedImages matched(model.cameras, std::move(images), std::move(pairs),
                         [&](uint32_t id) { return database.ReadKeypoints(id); });
   std::map<uint32_t, double> support;
-  for (const auto& [id, share] : MatchSupport(&matched, poses, pair_options)) {
-    support[id_of.at(id)] = share;
+  for (const auto& [id, count] : CountObeyingMatches(&matched, poses, pair_options)) {
+    support[id_of.at(id)] = count.Share();
   }
   return support;
 }

@@ -22,11 +22,18 @@ inline constexpr double kMinSupport = 0.75;
 // From the first image of the pair to the second, with a baseline of 1.
 Rigid ModelMotion(const SparseModel& model, const DatabasePair& pair);
 
+// Verified matches of a photo with others of the model.
+struct MatchCount {
+  size_t num_obeying = 0, num_matches = 0;
+  double Share() const {
+    return static_cast<double>(num_obeying) / static_cast<double>(num_matches);
+  }
+};
 // By image_id of both; photos without matches are missing. The cameras of `images` are the model's.
-std::map<uint32_t, double> MatchSupport(MatchedImages* images, const SparseModel& model,
-                                        const HypothesisOptions& pair_options);
-// The same by the names of the photos, of any model that was made from the database. Photos that it
-// does not know are missing.
+std::map<uint32_t, MatchCount> CountObeyingMatches(MatchedImages* images, const SparseModel& model,
+                                                   const HypothesisOptions& pair_options);
+// The share that obeys, by the names of the photos, of any model that was made from the database.
+// Photos that it does not know are missing.
 std::map<uint32_t, double> MatchSupport(const Database& database, const SparseModel& model,
                                         const HypothesisOptions& pair_options);
 

@@ -18,8 +18,8 @@ namespace roomtex {
 namespace {
 
 // Photos that the others contradict are left out up to this share of all; of more, nobody knows
-// which are right. Where more are doubtful the worst go first: a photo before the wrong one of two
-// shelves makes those doubtful that match it.
+// which are right. Where more are doubtful some go first (ModelCheck::doubtful): a photo before the
+// wrong one of two shelves makes those doubtful that match it.
 constexpr double kMaxLeftOut = 0.2;
 constexpr size_t kStepsIfMore = 4;
 constexpr int kMaxLeavings = 5;
@@ -89,9 +89,6 @@ bool PhotoParting::LeaveOutDoubtful() {
   std::vector<uint32_t> leaving = check.doubtful;
   if (leaving.empty() || max_left_out_ == 0) return false;
   if (leaving.size() > max_left_out_) {
-    std::stable_sort(leaving.begin(), leaving.end(), [&](uint32_t a, uint32_t b) {
-      return check.support.at(a) < check.support.at(b);
-    });
     leaving.resize(std::max<size_t>(1, max_left_out_ / kStepsIfMore));
   }
   std::set<uint32_t> kept;

@@ -117,11 +117,18 @@ ModelCheck CheckModel(MatchedImages* images, const SparseModel& model,
   ParallelFor(num_threads, 0, static_cast<int>(pairs.size()),
               [&](int i) { TestPair(options, &pairs[i]); });
   ModelCheck check;
-  check.support = MatchSupport(images, model, options.pair);
+  std::map<uint32_t, size_t> num_disobeying;
+  for (const auto& [image_id, count] : CountObeyingMatches(images, model, options.pair)) {
+    check.support[image_id] = count.Share();
+    num_disobeying[image_id] = count.num_matches - count.num_obeying;
+  }
   const double limit = SupportLimit(check.support, options.min_support);
   for (const auto& [image_id, share] : check.support) {
     if (share < limit) check.doubtful.push_back(image_id);
   }
+  std::stable_sort(check.doubtful.begin(), check.doubtful.end(), [&](uint32_t a, uint32_t b) {
+    return num_disobeying.at(a) > num_disobeying.at(b);
+  });
   for (const TestedPair& tested : pairs) {
     if (!tested.decided) continue;
     ++check.num_pairs;

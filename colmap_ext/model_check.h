@@ -36,8 +36,10 @@ struct ModelCheck {
   std::vector<std::pair<uint32_t, uint32_t>> contradicting;
   // Share of each photo's verified matches that obey the model; photos without matches are missing.
   std::map<uint32_t, double> support;
-  std::vector<uint32_t> doubtful;  // photos that lack support
-  bool trusted = true;             // neither doubtful photos nor too many contradicting pairs
+  // Photos that lack support; those first of which the most matches disobey: a photo that stands
+  // wrong has them with all others, one that matches it with that one alone.
+  std::vector<uint32_t> doubtful;
+  bool trusted = true;  // neither doubtful photos nor too many contradicting pairs
 };
 
 // without: the pair that the model was started from. The cameras of `images` are the model's.
