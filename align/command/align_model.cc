@@ -282,7 +282,7 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
     }
   }
   WritePlanes(a, reading, context);
-  if (!aligned) return WriteRefusal(a, refusal, reading.origin, context);
+  if (!aligned) return WriteRefusal(a, refusal, reading, context);
   WriteAligned(a, std::move(aligned->model), aligned->row_motions, aligned->local_from_sparse,
                &reading, told, context);
 }

@@ -115,6 +115,21 @@ std::string ChooseOutput(const AlignCommandOptions& a, const Command::Context& c
   return output_path;
 }
 
+// Stations that are off by more than this are misplaced (metres); drift and registration come to
+// less.
+constexpr double kMisplaced = 0.01;
+
+// Stations that are off among each other put an answer in doubt that claims to be nearer.
+void JudgeStations(const ScanReading& reading, const Command::Context& context) {
+  if (reading.stations_problem.empty()) return;
+  const double expected_mm = NumberAt(context.report.keys(), {"expected_error", "at_cameras_mm"});
+  if (reading.stations_offset < kMisplaced && 1000 * reading.stations_offset < expected_mm) {
+    context.Warn(reading.stations_problem + " The expected error is larger, and holds it.");
+  } else {
+    context.report.SetUntrusted(reading.stations_problem);
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> FilesOfAlignedModel() {
@@ -189,9 +204,10 @@ void WritePlanes(const AlignCommandOptions& a, const ScanReading& reading,
 }
 
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
-                  const LocalOrigin& origin, const Command::Context& context) {
-  origin.MoveBack(&context.report.keys());
+                  const ScanReading& reading, const Command::Context& context) {
+  reading.origin.MoveBack(&context.report.keys());
   context.report.SetUntrusted(refusal);
+  JudgeStations(reading, context);
   for (const char* key :
        {"scan_from_sparse", "picks", "scale", "planes", "plane_rms_m", "reprojection_rms_px",
         "expected_error", "agreement", "images", "search", "mirrored"}) {
@@ -211,6 +227,7 @@ void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
 void WriteAligned(const AlignCommandOptions& a, SparseModel model, const RowMotions& row_motions,
                   const std::optional<Similarity>& local_from_sparse, ScanReading* reading,
                   const std::set<std::string>& told, const Command::Context& context) {
+  JudgeStations(*reading, context);
   const std::string output_path = ChooseOutput(a, context);
   if (context.report.trusted()) WarnOfUntrusted(a, context);
   RequireNoRigs(output_path);

@@ -38,7 +38,7 @@ void WritePlanes(const AlignCommandOptions& a, const ScanReading& reading,
                  const Command::Context& context);
 // Nothing but the report, which says why; an earlier result that was not trusted either goes.
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
-                  const LocalOrigin& origin, const Command::Context& context);
+                  const ScanReading& reading, const Command::Context& context);
 // The aligned model and what belongs to it: overlays, similarity, `geo`. Without local_from_sparse
 // there was no sparse model. Model and scans are moved back to where the files have them.
 void WriteAligned(const AlignCommandOptions& a, SparseModel model, const RowMotions& row_motions,

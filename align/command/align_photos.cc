@@ -107,7 +107,7 @@ void AlignFoundPhotosOnly(const AlignCommandOptions& a, const PhotoModel& photos
   WritePlanes(a, reading, context);
   if (found.views.empty()) {
     for (const std::string& warning : placed.alignment.warnings) context.Warn(warning);
-    return WriteRefusal(a, placed.alignment.reasons[0], reading.origin, context);
+    return WriteRefusal(a, placed.alignment.reasons[0], reading, context);
   }
   WritePlacedPhotos(a, &placed, &reading, told, context);
 }
@@ -151,7 +151,7 @@ void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& con
   std::optional<PhotoAlignment> placed =
       FindPhotoAlignment(a, input, photos, found, context, &refusal);
   WritePlanes(a, reading, context);
-  if (!placed) return WriteRefusal(a, refusal, reading.origin, context);
+  if (!placed) return WriteRefusal(a, refusal, reading, context);
   WritePlacedPhotos(a, &*placed, &reading, told, context);
 }
 

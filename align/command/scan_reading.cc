@@ -26,8 +26,9 @@ PlacedScans ReadScansToAlign(const AlignCommandOptions& a) {
 }
 
 // Scans of several stations against each other; the report's `stations`.
-void CompareStations(const AlignCommandOptions& a, PlacedScans* placed,
+void CompareStations(const AlignCommandOptions& a, ScanReading* reading,
                      const Command::Context& context) {
+  PlacedScans* const placed = &reading->placed;
   std::vector<Scan>* const scans = &placed->scans;
   context.report["stations"] = Json::array();
   if (scans->size() < 2) return;
@@ -45,7 +46,9 @@ void CompareStations(const AlignCommandOptions& a, PlacedScans* placed,
   }
   const StationCheck check = CheckStations(*scans);
   context.report["stations"] = StationsToJson(check, *scans);
-  if (!check.wrong.empty()) context.report.SetUntrusted(check.Sentence(*scans));
+  if (check.wrong.empty()) return;
+  reading->stations_problem = check.Sentence(*scans);
+  reading->stations_offset = check.Worst()->offset;
 }
 
 }  // namespace
@@ -59,7 +62,7 @@ ScanReading::ScanReading(const AlignCommandOptions& a, const Command::Context& c
                           std::to_string(placed.stride) + " columns and rows one is held.");
   }
   ReplaceClouds(&placed.scans, context.options.num_threads);
-  CompareStations(a, &placed, context);
+  CompareStations(a, this, context);
   as_named = placed.SortByPath();
   geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
   origin = LocalOrigin(placed.scans);

@@ -31,6 +31,9 @@ struct ScanReading {
   std::unique_ptr<const std::vector<Scan>> mirrored;  // in place of placed.scans
   std::unique_ptr<const SurveyedScans> surveyed;
   std::optional<GeoReference> geo;
+  // Of stations that do not fit together: what is to be said, and by how much (metres).
+  std::string stations_problem;
+  double stations_offset = 0;
   AlignmentAttempt attempt;
   Json search;  // of an alignment without picks
 

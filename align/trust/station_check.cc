@@ -291,12 +291,17 @@ bool StationPair::Disagrees() const {
   return num_patches > 0 && offset > std::max(kLeastOffset, kDeviations * sigma);
 }
 
-std::string StationCheck::Sentence(const std::vector<Scan>& scans) const {
-  if (wrong.empty()) return "";
+const StationPair* StationCheck::Worst() const {
   const StationPair* worst = nullptr;
   for (const StationPair& pair : pairs) {
     if (pair.Disagrees() && (worst == nullptr || pair.offset > worst->offset)) worst = &pair;
   }
+  return worst;
+}
+
+std::string StationCheck::Sentence(const std::vector<Scan>& scans) const {
+  if (wrong.empty()) return "";
+  const StationPair* const worst = Worst();
   std::string names;
   for (const int scan : wrong) names += (names.empty() ? "" : ", ") + ScanName(scans, scan);
   return "The scans do not fit together: " + ScanName(scans, worst->first) + " and " +

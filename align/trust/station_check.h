@@ -29,6 +29,7 @@ struct StationCheck {
   // Stations that most of their neighbours contradict, worst first; of two that contradict each
   // other, both.
   std::vector<int> wrong;
+  const StationPair* Worst() const;  // of those that disagree; null without
   std::string Sentence(const std::vector<Scan>& scans) const;  // "" without wrong ones
 };
 

@@ -99,8 +99,26 @@ class TwoStations : public testing::Test {
                Capture("picks_enu.csv") + " " + more);
   }
   CommandResult Run(const std::string& options) const {
-    return RunCommandLine("roomtex-align --quiet --input_path " + (*folder_ / "sparse") +
-                          " --output_path " + (output_ / "aligned") + " " + options);
+    return RunCommandLine("roomtex-align --quiet --input_path " + sparse_ + " --output_path " +
+                          (output_ / "aligned") + " " + options);
+  }
+  // The poses with the second station so many times 13 mm off.
+  std::string StationOff(double times) const {
+    std::istringstream poses(ReadBytes(Capture("scan_poses.txt")));
+    std::ostringstream off;
+    for (std::string line; std::getline(poses, line);) {
+      std::istringstream words(line);
+      std::string name;
+      double w, x, y, z, tx, ty, tz;
+      if (words >> name >> w >> x >> y >> z >> tx >> ty >> tz && name == "scan_1.rtpi") {
+        off << name << " " << w << " " << x << " " << y << " " << z << " " << tx + 0.009 * times
+            << " " << ty - 0.007 * times << " " << tz + 0.006 * times << "\n";
+      } else {
+        off << line << "\n";
+      }
+    }
+    WriteBytes(output_ / "off.txt", off.str());
+    return output_ / "off.txt";
   }
   // Largest distance of a camera of the written model from its true place.
   static double WorstPosition(const std::string& model_path, const Rigid& frame_from_scan) {
@@ -126,6 +144,7 @@ class TwoStations : public testing::Test {
   }
 
   TempFolder output_;
+  std::string sparse_ = *folder_ / "sparse";
   static std::unique_ptr<TempFolder> folder_;
   static std::unique_ptr<SimulatedRoom> room_;
   static Rigid enu_from_scan_;
@@ -253,6 +272,24 @@ TEST_F(TwoStations, WithoutSurveyTheScanFrameStandsAtTheOrigin) {
       GeoFrame(kFirst).EnuFromStation({kFirst, 217.5}, Eigen::Vector3d::UnitY());
   EXPECT_LT(WorstPosition(output_ / "aligned/geo", enu_from_scan), 0.003);
   EXPECT_EQ(ReadReport()["geo"]["surveyed"], false);
+}
+
+// A station 13 mm off puts an answer in doubt that claims to be nearer, and no other.
+TEST_F(TwoStations, ThatAreFartherOffThanIsExpectedAreNotTrusted) {
+  const CommandResult exact = Align(StationOff(1));
+  EXPECT_EQ(exact.exit_code, 4) << exact.err;
+  EXPECT_THAT(exact.err, HasSubstr("The scans do not fit together"));
+  EXPECT_LT(ReadReport()["expected_error"]["at_cameras_mm"], 8);
+
+  WriteSparseModel(room_->MakeSparseModel(300, 8), output_ / "noisy");
+  sparse_ = output_ / "noisy";
+  const CommandResult noisy = Align(StationOff(1));
+  EXPECT_EQ(noisy.exit_code, 0) << noisy.err;
+  EXPECT_THAT(ReadReport()["warnings"].dump(), HasSubstr("The expected error is larger"));
+  EXPECT_GT(ReadReport()["expected_error"]["at_cameras_mm"], 8);
+
+  // Twice as far off it is misplaced, whatever is expected.
+  EXPECT_EQ(Align(StationOff(2)).exit_code, 4);
 }
 
 TEST_F(TwoStations, NeedGoodPoses) {
