@@ -10,8 +10,9 @@
 namespace roomtex {
 namespace {
 
-// Fewer points that a view ought to show and does not say nothing of it; more in common with the
-// model, of which only those of a pair are new to COLMAP's mapper, are no single thing.
+// Fewer points that a view ought to show and does not say nothing of it. With many in common it is
+// believed: they are known to a pair only, or COLMAP's mapper, which asks for 30, would have taken
+// the view, and so they are not those of one piece of furniture, which all photos of it share.
 constexpr double kMinMissed = 20;
 constexpr int kManyShown = 100;
 
