@@ -1,5 +1,6 @@
 #include "align/start_verdict.h"
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -136,6 +137,29 @@ TEST(StartVerdict, AHintIsAdvisedWhereItDecidesAndOnlyThere) {
         << "one that tells them apart";
     EXPECT_EQ(verdict.reason.find("--near") != std::string::npos, one.decides);
   }
+}
+
+// One wall is its own mirror image: what lies on nothing else must fit as well as a right model.
+TEST(StartVerdict, AMirrorImageOnOneWallAloneIsBelievedOnlyWhereItFitsAsTheRoomDoes) {
+  const AlignmentInput input{
+      MakeCase().model, Survey(MakeCase().scans), {}, "", MakeCase().azimuth};
+  const auto judge = [&](int mirrored_agreeing, double min_cosine) {
+    StartSearch search;
+    search.starts = {Start(600, kExact)};
+    search.mirrored = {Start(mirrored_agreeing, kExact)};
+    const std::vector<ScanPatch>& patches = input.surveyed.patches().patches();
+    for (const ScanPatch& patch : patches) {
+      if (std::abs(patch.normal.dot(patches[0].normal)) < min_cosine) continue;
+      SurfacePoint point;
+      point.x_in_sparse = {-patch.point.x(), patch.point.y(), patch.point.z()};
+      search.cloud.points.push_back(point);
+    }
+    return JudgeStarts(input, search, false, {}).kind;
+  };
+  constexpr double kThatWall = 0.99, kAllWalls = 0;
+  EXPECT_EQ(judge(800, kAllWalls), Kind::kMirrored);
+  EXPECT_NE(judge(800, kThatWall), Kind::kMirrored);
+  EXPECT_EQ(judge(950, kThatWall), Kind::kMirrored);
 }
 
 // Of answers by geometry and a hint nobody has counted how many are wrong.
