@@ -34,7 +34,8 @@ constexpr long kFewPatches = 150;
 
 // One wall, or two that meet, are their own mirror images: a reflected model that such a surface
 // leaves open has to fit as well as a right one does. Of three captures that are mirrored 0.93 to
-// 0.99 of the rays agree, of two that are not, and whose place was not found, 0.80 and 0.82.
+// 0.99 of the rays agree, of two that are not, and whose place was not found, 0.80 and 0.82
+// (docs/automatic.md).
 constexpr double kSurelyMirrored = 0.9;
 
 // What geometry alone is worth where photos do not confirm it.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <iterator>
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -17,9 +18,10 @@
 namespace roomtex {
 namespace {
 
-// Photos that the others contradict are left out up to this share of all; of more, nobody knows
-// which are right. Where more are doubtful some go first (ModelCheck::doubtful): a photo before the
-// wrong one of two shelves makes those doubtful that match it.
+// Photos that the others contradict are left out up to this share of all. Where more are doubtful
+// some go first (ModelCheck::doubtful): a photo before the wrong one of two shelves makes those
+// doubtful that match it. If photos are in doubt yet when so many are gone, nobody knows which are
+// right, and all stay.
 constexpr double kMaxLeftOut = 0.2;
 constexpr size_t kStepsIfMore = 4;
 constexpr int kMaxLeavings = 5;
@@ -43,11 +45,7 @@ class PhotoParting {
 
   void Run() {
     pass_->check = Check(pass_->model());
-    max_left_out_ =
-        static_cast<size_t>(kMaxLeftOut * static_cast<double>(pass_->model().images.size()));
-    for (int i = 0; i < kMaxLeavings && LeaveOutDoubtful(); ++i) {
-      pass_->check = Check(pass_->model());
-    }
+    LeaveOutDoubtful();
     if (!options_.take_rooms_apart || !TakeRoomsApart()) return;
     pass_->check = Check(pass_->model());
     for (const MapperResult& room : pass_->best[0].other_rooms) {
@@ -57,8 +55,9 @@ class PhotoParting {
 
  private:
   ModelCheck Check(const SparseModel& model) const;
-  // False: nothing was to be left out, or could be.
-  bool LeaveOutDoubtful();
+  void LeaveOutDoubtful();
+  // Adjusts the model without them; false: that failed, and nothing has changed.
+  bool LeaveOut(const std::vector<uint32_t>& leaving);
   // True: there were several, and the model is that of one.
   bool TakeRoomsApart();
   const std::string& NameOf(uint32_t image_id) const {
@@ -70,7 +69,6 @@ class PhotoParting {
   const Database& database_;
   const KnownPhotos& known_;
   MappingPass* pass_;
-  size_t max_left_out_ = 0;  // photos that may be left out yet
 };
 
 ModelCheck PhotoParting::Check(const SparseModel& model) const {
@@ -83,14 +81,35 @@ ModelCheck PhotoParting::Check(const SparseModel& model) const {
                     context_.options.num_threads);
 }
 
-bool PhotoParting::LeaveOutDoubtful() {
+void PhotoParting::LeaveOutDoubtful() {
   MappingOutcome& outcome = pass_->best[0];
-  const ModelCheck& check = pass_->check;
-  std::vector<uint32_t> leaving = check.doubtful;
-  if (leaving.empty() || max_left_out_ == 0) return false;
-  if (leaving.size() > max_left_out_) {
-    leaving.resize(std::max<size_t>(1, max_left_out_ / kStepsIfMore));
+  const MapperResult whole = outcome.result;
+  const ModelCheck check_of_whole = pass_->check;
+  auto left = static_cast<size_t>(kMaxLeftOut * static_cast<double>(whole.model.images.size()));
+  const bool are_many = pass_->check.doubtful.size() > left;
+  std::map<uint32_t, double> support;  // of those left out
+  for (int i = 0; i < kMaxLeavings && left > 0 && !pass_->check.doubtful.empty(); ++i) {
+    std::vector<uint32_t> leaving = pass_->check.doubtful;
+    if (leaving.size() > left) leaving.resize(std::max<size_t>(1, left / kStepsIfMore));
+    if (!LeaveOut(leaving)) break;
+    left -= leaving.size();
+    for (const uint32_t image_id : leaving) support[image_id] = pass_->check.support.at(image_id);
+    pass_->check = Check(pass_->model());
   }
+  if (are_many && !pass_->check.doubtful.empty()) {
+    outcome.result = whole;
+    pass_->check = check_of_whole;
+    return;
+  }
+  for (const auto& [image_id, share] : support) {
+    outcome.reasons[image_id] = "stood where only " + Percent(share) + " of its own matches put it";
+    context_.Warn(NameOf(image_id) + " is left out: only " + Percent(share) +
+                  " of its own matches obey the model. It may show a repeated pattern, another "
+                  "room, or something that moved.");
+  }
+}
+
+bool PhotoParting::LeaveOut(const std::vector<uint32_t>& leaving) {
   std::set<uint32_t> kept;
   for (const auto& [id, image] : pass_->model().images) kept.insert(id);
   for (const uint32_t image_id : leaving) kept.erase(image_id);
@@ -99,16 +118,9 @@ bool PhotoParting::LeaveOutDoubtful() {
   if (!adjusted.problem.empty() || adjusted.model.images.size() != poses.images.size()) {
     return false;
   }
-  adjusted.grew = outcome.result.grew;
-  outcome.result = std::move(adjusted);
-  max_left_out_ -= leaving.size();
-  for (const uint32_t image_id : leaving) {
-    const std::string share = Percent(check.support.at(image_id));
-    outcome.reasons[image_id] = "stood where only " + share + " of its own matches put it";
-    context_.Warn(NameOf(image_id) + " is left out: only " + share +
-                  " of its own matches obey the model. It may show a repeated pattern, another "
-                  "room, or something that moved.");
-  }
+  MapperResult& result = pass_->best[0].result;
+  adjusted.grew = result.grew;
+  result = std::move(adjusted);
   return true;
 }
 

@@ -80,8 +80,8 @@ void ChainOptions::Declare(OptionFields* fields) {
       .AtLeast(1);
   fields
       ->Number("Chain.min_sight_share", &min_sight_share,
-               "Of the points that a photo so registered ought to have in common with the others "
-               "it must have this share, unless they are 100 and more: before a second cupboard of "
+               "A photo so registered that has fewer than 100 points in common with the others "
+               "must have this share of those that it ought to have: before a second cupboard of "
                "the same make it has not. Larger = stricter, 0 = not asked.")
       .AtLeast(0)
       .AtMost(1);

@@ -1,5 +1,7 @@
 #include "workflow/align_remedies.h"
 
+#include <algorithm>
+
 #include "core/child_program.h"
 
 namespace roomtex {
@@ -51,6 +53,18 @@ std::vector<std::string> HintRemedies(const Chain& chain, bool several) {
   return remedies;
 }
 
+// Scans that do not fit together, and were not registered anew.
+bool StationsDisagree(const Json& report) {
+  const Json pairs = report.is_object() ? report.value("stations", Json()) : Json();
+  return std::any_of(pairs.begin(), pairs.end(),
+                     [](const Json& pair) { return !pair.value("agree", true); });
+}
+
+std::string RegisterStationsRemedy(AutoOptions options) {
+  options.register_stations = true;
+  return "Let the scans that do not fit together be registered anew: " + CommandWith(options);
+}
+
 }  // namespace
 
 std::vector<std::string> AlignRemedies(const Chain& chain, const Json& report) {
@@ -62,6 +76,9 @@ std::vector<std::string> AlignRemedies(const Chain& chain, const Json& report) {
   if (verdict == "mirrored" || mirrored == "scan") return MirroredRemedies(chain.options());
   if (search.value("hint_decides", false)) return HintRemedies(chain, verdict == "ambiguous");
   std::vector<std::string> remedies;
+  if (!chain.options().register_stations && StationsDisagree(report)) {
+    remedies.push_back(RegisterStationsRemedy(chain.options()));
+  }
   if (verdict == "none" || verdict == "weak" || verdict == "photos contradict") {
     remedies.emplace_back(kCheckRoom);
   }

@@ -115,21 +115,6 @@ std::string ChooseOutput(const AlignCommandOptions& a, const Command::Context& c
   return output_path;
 }
 
-// Stations that are off by more than this are misplaced (metres); drift and registration come to
-// less.
-constexpr double kMisplaced = 0.01;
-
-// Stations that are off among each other put an answer in doubt that claims to be nearer.
-void JudgeStations(const ScanReading& reading, const Command::Context& context) {
-  if (reading.stations_problem.empty()) return;
-  const double expected_mm = NumberAt(context.report.keys(), {"expected_error", "at_cameras_mm"});
-  if (reading.stations_offset < kMisplaced && 1000 * reading.stations_offset < expected_mm) {
-    context.Warn(reading.stations_problem + " The expected error is larger, and holds it.");
-  } else {
-    context.report.SetUntrusted(reading.stations_problem);
-  }
-}
-
 }  // namespace
 
 std::vector<std::string> FilesOfAlignedModel() {

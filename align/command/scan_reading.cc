@@ -25,6 +25,10 @@ PlacedScans ReadScansToAlign(const AlignCommandOptions& a) {
                           {a.scan_paths, a.scan_poses, reader, max_samples});
 }
 
+// Stations that are off by more than this are misplaced (metres); drift and registration come to
+// less.
+constexpr double kMisplaced = 0.01;
+
 // Scans of several stations against each other; the report's `stations`.
 void CompareStations(const AlignCommandOptions& a, ScanReading* reading,
                      const Command::Context& context) {
@@ -70,6 +74,16 @@ ScanReading::ScanReading(const AlignCommandOptions& a, const Command::Context& c
   SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
   options.num_threads = context.options.num_threads;
   surveyed = std::make_unique<const SurveyedScans>(placed.scans, options);
+}
+
+void JudgeStations(const ScanReading& reading, const Command::Context& context) {
+  if (reading.stations_problem.empty()) return;
+  const double expected_mm = NumberAt(context.report.keys(), {"expected_error", "at_cameras_mm"});
+  if (reading.stations_offset < kMisplaced && 1000 * reading.stations_offset < expected_mm) {
+    context.Warn(reading.stations_problem + " The expected error is larger, and holds it.");
+  } else {
+    context.report.SetUntrusted(reading.stations_problem);
+  }
 }
 
 std::string ScanReading::azimuth() const {

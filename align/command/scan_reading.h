@@ -41,6 +41,9 @@ struct ScanReading {
   std::string azimuth() const;
 };
 
+// Stations that do not fit together make an answer untrusted that claims to be nearer than they
+// are: by the report's `expected_error`, once it is there.
+void JudgeStations(const ScanReading& reading, const Command::Context& context);
 // Nobody said how the scans are to be read, and all of them could be mirrored.
 bool MayTurn(const AlignCommandOptions& a, const ScanReading& reading);
 // The other reading of RTPI scans, with a warning that says what has shown it.

@@ -140,10 +140,10 @@ TEST_F(MapperCommand, DoesNotTrustABentModel) {
 
 // A photo of another room with the same pictures on the walls: some of its matches put it here, the
 // others there. Wherever it was registered, the rest of its matches disobeys.
-SimulatedViews WithStranger(SimulatedViews views, uint32_t stranger) {
+SimulatedViews WithStranger(SimulatedViews views, uint32_t stranger, double times = 1) {
   const CameraProjection projection(views.cameras.at(1));
   Rigid elsewhere = views.cam_from_scene.at(stranger);
-  elsewhere.translation += Eigen::Vector3d(0.35, -0.2, 0.3);
+  elsewhere.translation += times * Eigen::Vector3d(0.35, -0.2, 0.3);
   std::vector<Eigen::Vector2d>& keypoints = views.keypoints.at(stranger);
   for (size_t row = 0; row < keypoints.size(); ++row) {
     const int point = views.point_of_keypoint.at(stranger)[row];
@@ -192,6 +192,17 @@ TEST_F(MapperCommand, ThePhotoThatPutsAnotherInDoubtGoesFirst) {
   EXPECT_EQ(model.images.size(), 5u);
   EXPECT_EQ(model.images.count(stranger), 0u);
   ExpectNearTruth(model, 0.02, 0.01);
+}
+
+// Of six with two strangers one may be left out: nobody knows which are right, and all stay.
+TEST_F(MapperCommand, WhereTooManyPhotosAreInDoubtAllStay) {
+  views_ = WithStranger(WithStranger(SimulateViews(RoomOptions(6)), 5), 2, -1);
+  WriteSimulatedDatabase(views_, folder_.path());
+  const CommandResult result = Run();
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.err, testing::Not(testing::HasSubstr("is left out")));
+  EXPECT_EQ(Report()["num_reg_images"], 6);
+  EXPECT_GT(Report()["check"]["doubtful_images"].size(), 1u);
 }
 
 // Before a wall poses and points take up a wrong lens, and the model is bent.

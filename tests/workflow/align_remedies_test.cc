@@ -95,6 +95,15 @@ TEST_F(AlignRemediesTest, AHintThatDidNotHelpIsToBeChecked) {
   EXPECT_THAT(Of("ambiguous")[0], HasSubstr("add others, six in all"));
 }
 
+TEST_F(AlignRemediesTest, ScansThatDoNotFitTogetherAreToBeRegisteredFirst) {
+  const Json report = {{"search", nullptr}, {"stations", {{{"agree", true}}, {{"agree", false}}}}};
+  EXPECT_THAT(OfReport(report)[0], HasSubstr(" --register_stations 1"));
+  options_.register_stations = true;
+  EXPECT_THAT(OfReport(report)[0], HasSubstr("Pick six points"));
+  options_.register_stations = false;
+  EXPECT_THAT(OfReport({{"stations", {{{"agree", true}}}}})[0], HasSubstr("Pick six points"));
+}
+
 TEST_F(AlignRemediesTest, PicksWithoutASearchAreToBeMended) {
   WriteBytes(folder_ / "result/picks.csv", "");
   EXPECT_THAT(OfReport({{"search", nullptr}})[0], HasSubstr("Look at the picks and mend them: "));
