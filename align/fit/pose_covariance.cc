@@ -18,39 +18,47 @@
 namespace roomtex {
 namespace {
 
+// The photos that took part: by the photo whose pose is theirs, which is the first of a frame.
+std::map<uint32_t, std::vector<uint32_t>> PhotosOfPose(const PlaneBundle& bundle) {
+  std::map<uint32_t, uint32_t> first_of_frame;
+  std::map<uint32_t, std::vector<uint32_t>> photos;
+  for (const auto& [id, image] : bundle.model.images) {
+    if (bundle.idle_images.count(id) > 0) continue;
+    const uint32_t first =
+        image.frame_id == kNoFrame ? id : first_of_frame.emplace(image.frame_id, id).first->second;
+    photos[first].push_back(id);
+  }
+  return photos;
+}
+
+// Of the photos that are named alone: what others know is left out.
 class ReducedSystem {
  public:
   ReducedSystem(const PlaneBundleInput& input, const PlaneBundle& bundle,
-                const PlaneBundleOptions& options, size_t max_poses)
+                const PlaneBundleOptions& options, size_t max_poses,
+                const std::map<uint32_t, std::vector<uint32_t>>& photos_of_pose)
       : input_(input),
         bundle_(bundle),
         with_lenses_(options.refine_intrinsics),
         hold_centre_(options.hold_centre) {
-    std::map<uint32_t, uint32_t> first_of_frame;
-    for (const auto& [id, image] : bundle.model.images) {
-      if (bundle.idle_images.count(id) > 0) continue;
-      // Photos of one frame have one pose, that of its first.
-      const uint32_t first = image.frame_id == kNoFrame
-                                 ? id
-                                 : first_of_frame.emplace(image.frame_id, id).first->second;
-      const Rigid& rig_from_scan = bundle.model.images.at(first).cam_from_model;
-      poses_.emplace(id, PoseParameters(rig_from_scan));
-      cam_from_rig_[id] = first == id ? Rigid() : image.cam_from_model * rig_from_scan.Inverse();
-      const bool fixed = options.fix_clicked_view && image.name == input.clicked_image;
-      if (with_lenses_) camera_offset_[image.camera_id] = -1;
-      if (first != id && pose_offset_.count(first) > 0) {
-        pose_offset_.emplace(id, pose_offset_.at(first));
-      } else if (first == id && !fixed) {
-        pose_offset_.emplace(id, 6 * num_poses_++);
+    for (const auto& [first, ids] : photos_of_pose) {
+      const SparseImage& first_image = bundle.model.images.at(first);
+      const Rigid& rig_from_scan = first_image.cam_from_model;
+      const bool fixed = options.fix_clicked_view && first_image.name == input.clicked_image;
+      for (const uint32_t id : ids) {
+        const SparseImage& image = bundle.model.images.at(id);
+        poses_.emplace(id, PoseParameters(rig_from_scan));
+        cam_from_rig_[id] = first == id ? Rigid() : image.cam_from_model * rig_from_scan.Inverse();
+        if (with_lenses_) camera_offset_[image.camera_id] = -1;
+        if (!fixed) pose_offset_.emplace(id, 6 * num_poses_);
       }
+      num_poses_ += !fixed;
     }
     num_unknowns_ = 6 * num_poses_;
     PlaceLenses();
     // Of more photos the matrix would be too large.
     if (2 * pose_offset_.size() <= max_poses) PlaceMotions();
   }
-
-  size_t num_poses() const { return static_cast<size_t>(num_poses_); }
 
   BundleCovariances Find() const {
     ReducedNormal normal(num_unknowns_);
@@ -305,9 +313,22 @@ class ReducedSystem {
 BundleCovariances FindCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
                                   const PlaneBundleOptions& options, size_t max_poses) {
   if (!bundle.usable) return {};
-  const ReducedSystem system(input, bundle, options, max_poses);
-  if (system.num_poses() == 0 || system.num_poses() > max_poses) return {};
-  return system.Find();
+  const std::map<uint32_t, std::vector<uint32_t>> all = PhotosOfPose(bundle);
+  const size_t num_groups = (all.size() + max_poses - 1) / max_poses;
+  BundleCovariances found;
+  auto next = all.begin();
+  for (size_t group = 0; group < num_groups; ++group) {
+    std::map<uint32_t, std::vector<uint32_t>> photos;
+    const size_t end = all.size() * (group + 1) / num_groups;
+    for (size_t i = all.size() * group / num_groups; i < end; ++i) photos.insert(*next++);
+    BundleCovariances of_group = ReducedSystem(input, bundle, options, max_poses, photos).Find();
+    found.poses.merge(of_group.poses);
+    for (const auto& [camera_id, covariance] : of_group.cameras) {
+      const auto [at, is_first] = found.cameras.emplace(camera_id, covariance);
+      if (!is_first && covariance.trace() < at->second.trace()) at->second = covariance;
+    }
+  }
+  return found;
 }
 
 }  // namespace roomtex

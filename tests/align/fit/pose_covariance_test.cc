@@ -1,6 +1,7 @@
 #include "align/fit/pose_covariance.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <gmock/gmock.h>
 
 #include "tests/align/surface/surface_room.h"
@@ -148,6 +149,38 @@ TEST(PoseCovariance, OfManyPhotosKnowsThatTheirRowsMove) {
   for (const std::vector<double>& ratios : {positions, rotations}) {
     EXPECT_GT(*std::min_element(ratios.begin(), ratios.end()), 0.95);
     EXPECT_LT(SpreadOf(ratios).median, 1.3);
+  }
+}
+
+// More photos than are taken together: in groups, which know less each and nothing that is not so.
+TEST(PoseCovariance, OfGroupsOfPhotosSaysMoreThanOfAllAndNeverLess) {
+  const Reconstruction& one = StraightRoom();
+  const PlaneBundleInput input = one.room.Input(one.model);
+  PlaneBundleOptions options;
+  options.refine_intrinsics = true;
+  const PlaneBundle bundle = AdjustToSurface(input, options);
+  const size_t num_photos = one.model.images.size();
+  const BundleCovariances together = FindCovariances(input, bundle, options, num_photos),
+                          in_groups = FindCovariances(input, bundle, options, num_photos / 2);
+  ASSERT_EQ(together.poses.size(), num_photos);
+  ASSERT_EQ(in_groups.poses.size(), num_photos);
+  const auto more = [](const Eigen::MatrixXd& than, const Eigen::MatrixXd& other) {
+    const Eigen::MatrixXd root = than.llt().matrixL();
+    const Eigen::MatrixXd half = root.triangularView<Eigen::Lower>().solve(other);
+    const Eigen::MatrixXd ratio =
+        root.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd(half.transpose()));
+    return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(ratio).eigenvalues();
+  };
+  std::vector<double> largest;
+  for (const auto& [id, covariance] : together.poses) {
+    const Eigen::VectorXd ratios = more(covariance, in_groups.poses.at(id));
+    EXPECT_GT(ratios.minCoeff(), 0.99) << id;
+    largest.push_back(std::sqrt(ratios.maxCoeff()));
+  }
+  EXPECT_LT(SpreadOf(largest).median, 4);
+  ASSERT_EQ(in_groups.cameras.size(), together.cameras.size());
+  for (const auto& [id, covariance] : together.cameras) {
+    EXPECT_GT(more(covariance, in_groups.cameras.at(id)).minCoeff(), 0.99) << id;
   }
 }
 
