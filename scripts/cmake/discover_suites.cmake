@@ -1,4 +1,5 @@
-# Run after PROGRAM was linked: asks it for its test suites and writes OUTPUT, which ctest includes: a test per suite.
+# Run after PROGRAM was linked: asks it for its test suites and writes OUTPUT, which ctest includes: a test per suite,
+# without the tests of SLOW (SUITE.NAME:...).
 execute_process(COMMAND ${PROGRAM} --gtest_list_tests OUTPUT_VARIABLE listed RESULT_VARIABLE result TIMEOUT 60)
 if(NOT result EQUAL 0)
   message(FATAL_ERROR "${PROGRAM} --gtest_list_tests: ${result}")
@@ -10,7 +11,7 @@ set(script "")
 foreach(suite ${suites})
   string(REGEX REPLACE "[.]$" "" name "${suite}")
   if(NOT name MATCHES "(^|/)DISABLED_")
-    string(APPEND script "add_test([==[${name}]==] \"${PROGRAM}\" [==[--gtest_filter=${suite}*]==])\n"
+    string(APPEND script "add_test([==[${name}]==] \"${PROGRAM}\" [==[--gtest_filter=${suite}*-${SLOW}]==])\n"
                          "set_tests_properties([==[${name}]==] PROPERTIES LABELS ${LABEL})\n")
   endif()
 endforeach()

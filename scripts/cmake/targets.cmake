@@ -64,8 +64,8 @@ endfunction()
 # roomtex_test(NAME [WHOLE] [LABEL l] [SLOW tests...] SOURCES files... LIBRARIES ...): every suite of tests becomes a
 # ctest of its own, labelled `unit` or l: what a suite sets up is paid once, and so is starting a program, which takes
 # 0.1 s of processor for OpenCV and what comes with it. WHOLE: the program is one ctest, because its suites share a
-# costly fixture or are short. SLOW, of a WHOLE one: tests (SUITE.NAME) that vary what others hold and take long;
-# NAME_slow runs them, labelled slow.
+# costly fixture or are short. SLOW: tests (SUITE.NAME) that vary what others hold and take long; NAME_slow runs them,
+# labelled slow.
 function(roomtex_test name)
   cmake_parse_arguments(ARG "WHOLE" "LABEL" "SLOW;SOURCES;LIBRARIES" ${ARGN})
   if(NOT ARG_LABEL)
@@ -76,32 +76,32 @@ function(roomtex_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} roomtex_test_support GTest::gmock
                         GTest::gtest_main)
   target_precompile_headers(${name} REUSE_FROM roomtex_precompiled_tests)
+  string(JOIN ":" slow ${ARG_SLOW})
+  if(ARG_SLOW)
+    add_test(NAME ${name}_slow COMMAND ${name} --gtest_filter=${slow})
+    # All of them: a name that is no test's must not pass for one. With an expression to pass by, ctest no longer asks
+    # for the exit code: what fails says so, a fixture's set-up, too.
+    list(LENGTH ARG_SLOW num_slow)
+    set_tests_properties(${name}_slow PROPERTIES LABELS slow TIMEOUT 1500 PASS_REGULAR_EXPRESSION
+                         "(PASSED |SKIPPED) ] ${num_slow} test" FAIL_REGULAR_EXPRESSION "FAILED")
+  endif()
   if(ARG_WHOLE)
-    set(filter)
-    if(ARG_SLOW)
-      string(JOIN ":" slow ${ARG_SLOW})
-      set(filter --gtest_filter=-${slow})
-      add_test(NAME ${name}_slow COMMAND ${name} --gtest_filter=${slow})
-      # All of them: a name that is no test's must not pass for one. With an expression to pass by, ctest no longer asks
-      # for the exit code: what fails says so, a fixture's set-up, too.
-      list(LENGTH ARG_SLOW num_slow)
-      set_tests_properties(${name}_slow PROPERTIES LABELS slow TIMEOUT 1500 PASS_REGULAR_EXPRESSION
-                           "(PASSED |SKIPPED) ] ${num_slow} test" FAIL_REGULAR_EXPRESSION "FAILED")
-    endif()
-    add_test(NAME ${name} COMMAND ${name} ${filter})
+    add_test(NAME ${name} COMMAND ${name} --gtest_filter=-${slow})
     # Long ones first, also where ctest knows no times yet: none is then left for the end alone.
     set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} COST 40)
   else()
-    roomtex_discover_suites(${name} ${ARG_LABEL})
+    roomtex_discover_suites(${name} ${ARG_LABEL} "${slow}")
   endif()
 endfunction()
 
-# A ctest for every suite of the test program `name`, which is asked for them once it is linked.
-function(roomtex_discover_suites name label)
+# A ctest for every suite of the test program `name`, which is asked for them once it is linked; without the tests of
+# `slow` (SUITE.NAME:...).
+function(roomtex_discover_suites name label slow)
   set(script ${PROJECT_SOURCE_DIR}/scripts/cmake/discover_suites.cmake)
   set(suites ${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake)
   add_custom_command(TARGET ${name} POST_BUILD
-    COMMAND ${CMAKE_COMMAND} -D PROGRAM=$<TARGET_FILE:${name}> -D LABEL=${label} -D OUTPUT=${suites} -P ${script}
+    COMMAND ${CMAKE_COMMAND} -D PROGRAM=$<TARGET_FILE:${name}> -D LABEL=${label} -D SLOW=${slow} -D OUTPUT=${suites}
+            -P ${script}
     BYPRODUCTS ${suites} VERBATIM)
   # A program that was not built is a test that fails.
   file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/${name}_include.cmake

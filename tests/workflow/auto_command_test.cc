@@ -484,25 +484,40 @@ TEST_F(AutoCommand, ScansOfOneNameInOtherFoldersAreTwoInputs) {
 
 // Photos that are matched in another way, or once more, keep the features that they have.
 TEST_F(AutoCommand, FeaturesOutliveTheirMatches) {
-  const auto features = TimeOf("log/features.log");
-  const auto keypoints = [] { return Database(Result("database.db")).CountKeypoints(); };
-  const auto matches = [] {
+  const std::string few = *folder_ / "few";
+  fs::create_directories(few + "/photos");
+  for (const char* name : {"photo_000.jpg", "photo_001.jpg", "photo_002.jpg", "photo_003.jpg"}) {
+    fs::copy(*folder_ / ("capture/photos/" + std::string(name)), few + "/photos");
+  }
+  const std::string database_path = few + "/result/database.db";
+  const std::string arguments = "roomtex-auto --quality low --image_path " + few +
+                                "/photos --scan_path " + (*folder_ / "capture/scan.rtpi") +
+                                " --cameras_path " + (*folder_ / "capture/cameras.txt") +
+                                " --output_path " + few + "/result";
+  const CommandResult first = RunCommandLine(arguments + " --until matches");
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  const auto time_of_features = [&] {
+    return fs::last_write_time(few + "/result/log/features.log");
+  };
+  const auto features = time_of_features();
+  const auto keypoints = [&] { return Database(database_path).CountKeypoints(); };
+  const auto matches = [&] {
     size_t sum = 0;
-    for (const auto& [pair, count] : Database(Result("database.db")).CountMatches()) sum += count;
+    for (const auto& [pair, count] : Database(database_path).CountMatches()) sum += count;
     return sum;
   };
   const auto features_before = keypoints();
   const size_t matches_before = matches();
 
   // What cannot be matched leaves what there was, whole, and its features for the next time.
-  const std::string database = ReadBytes(Result("database.db"));
-  const std::string with_ratio = Arguments() + " --until matches --SiftMatching.max_ratio ";
+  const std::string database = ReadBytes(database_path);
+  const std::string with_ratio = arguments + " --until matches --SiftMatching.max_ratio ";
   const CommandResult failed = RunCommandLine(with_ratio + "nonsense");
   EXPECT_EQ(failed.exit_code, 3) << failed.err;
   EXPECT_THAT(failed.err, HasSubstr("features: done before"));
-  EXPECT_EQ(ReadBytes(Result("database.db")), database);
-  EXPECT_TRUE(fs::exists(Result("database.partial.db")));
-  EXPECT_EQ(ReadJson(Result("report.json"))["verdict"]["state"], "failed");
+  EXPECT_EQ(ReadBytes(database_path), database);
+  EXPECT_TRUE(fs::exists(few + "/result/database.partial.db"));
+  EXPECT_EQ(ReadJson(few + "/result/report.json")["verdict"]["state"], "failed");
 
   const CommandResult stricter = RunCommandLine(with_ratio + "0.5");
   EXPECT_EQ(stricter.exit_code, 0) << stricter.err;
@@ -510,26 +525,26 @@ TEST_F(AutoCommand, FeaturesOutliveTheirMatches) {
   EXPECT_EQ(keypoints(), features_before);
   EXPECT_LT(matches(), 0.8 * matches_before);
 
-  const CommandResult again = RunCommandLine(Arguments() + " --only matches");
+  const CommandResult again = RunCommandLine(arguments + " --only matches");
   EXPECT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_EQ(TimeOf("log/features.log"), features);
+  EXPECT_EQ(time_of_features(), features);
   EXPECT_EQ(keypoints(), features_before);
   EXPECT_NEAR(matches(), matches_before, 0.05 * matches_before);
 
   // As after a kill between the last match and the record of the step.
-  json steps = ReadJson(Result("steps.json"));
+  json steps = ReadJson(few + "/result/steps.json");
   steps["steps"]["matches"]["state"] = "started";
-  WriteBytes(Result("steps.json"), steps.dump());
-  const CommandResult killed = RunCommandLine(Arguments() + " --until matches");
+  WriteBytes(few + "/result/steps.json", steps.dump());
+  const CommandResult killed = RunCommandLine(arguments + " --until matches");
   EXPECT_EQ(killed.exit_code, 0) << killed.err;
   EXPECT_THAT(killed.err, HasSubstr("features: done before"));
   EXPECT_EQ(keypoints(), features_before);
 
-  const CommandResult nothing = RunCommandLine(Arguments() + " --until matches");
+  const CommandResult nothing = RunCommandLine(arguments + " --until matches");
   EXPECT_EQ(nothing.exit_code, 0) << nothing.err;
   EXPECT_THAT(nothing.err, Not(HasSubstr("$ ")));
-  EXPECT_FALSE(fs::exists(Result("database.partial.db")));
-  EXPECT_FALSE(fs::exists(Result("database.copy.db")));
+  EXPECT_FALSE(fs::exists(few + "/result/database.partial.db"));
+  EXPECT_FALSE(fs::exists(few + "/result/database.copy.db"));
 }
 
 TEST_F(AutoCommand, OneRunAtATime) {
