@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -15,11 +16,13 @@ namespace roomtex {
 namespace {
 
 constexpr int kLeafSize = 8;
-// Cubes grow until so many of the samples lie in those of enough samples, up to so many times. Of
-// a scan of 400 columns a quarter did in cubes of 6 cm, near the station alone, and stations that
-// stood right were found to be up to 18 mm off. Growing place by place, or where it is the noise
-// that leaves few patches, has let the scan of another room be trusted.
-constexpr double kEnoughInPatches = 0.6, kGrowth = 1.25, kMostGrowth = 4;
+// Cubes grow, all alike and up to so many times, until so many of the samples lie in those of
+// enough samples, and so many in flat ones. Of a scan of 400 columns a quarter lay in cubes of 6 cm
+// that had enough of them, near the station alone, and stations that stood right were found to be
+// up to 18 mm off. Of five scans by depth cameras 19, 23, 31, 50 and 50 % lay in flat ones, of 13
+// others 64 % and more; growing until 60 % do has not placed photos better where half do. Growing
+// place by place has let the scan of another room be trusted.
+constexpr double kEnoughInFull = 0.6, kEnoughInFlat = 0.4, kGrowth = 1.25, kMostGrowth = 4;
 
 // Sums over the samples of one cube, relative to `origin` (the first of them), so that large
 // coordinates keep their precision.
@@ -56,16 +59,6 @@ class CellGrid {
   }
 
   const std::vector<Cell>& cells() const { return cells_; }
-
-  // Of the samples, those in cubes of at least min_samples.
-  double ShareOfFullCells(int min_samples) const {
-    double full = 0, all = 0;
-    for (const Cell& cell : cells_) {
-      all += cell.count;
-      if (cell.count >= min_samples) full += cell.count;
-    }
-    return all > 0 ? full / all : 1;
-  }
 
  private:
   double cell_size_;
@@ -105,6 +98,31 @@ std::optional<ScanPatch> FitPatch(const Cell& cell, double cell_size,
   return patch;
 }
 
+struct FlatCubes {
+  std::vector<ScanPatch> patches;
+  double enough = 1;  // below 1 where too few of the samples lie in full cubes, or in flat ones
+};
+
+FlatCubes FindFlatCubes(const std::vector<Scan>& scans, double cell_size,
+                        const ScanPatchOptions& options) {
+  FlatCubes flat;
+  double num_samples = 0, num_in_full = 0, num_in_flat = 0;
+  const CellGrid grid = MakeGrid(scans, cell_size);
+  for (const Cell& cell : grid.cells()) {
+    num_samples += cell.count;
+    if (cell.count >= options.min_samples) num_in_full += cell.count;
+    const auto patch = FitPatch(cell, cell_size, options);
+    if (!patch) continue;
+    num_in_flat += cell.count;
+    flat.patches.push_back(*patch);
+  }
+  if (num_samples > 0) {
+    flat.enough = std::min(num_in_full / (kEnoughInFull * num_samples),
+                           num_in_flat / (kEnoughInFlat * num_samples));
+  }
+  return flat;
+}
+
 }  // namespace
 
 void VisitSurface(const Scan& scan, double spacing,
@@ -125,7 +143,7 @@ void ScanPatchOptions::Declare(OptionFields* fields) {
   fields
       ->Number("Patches.cell_size", &cell_size,
                "Metres; edge of the cubes whose samples make one flat patch of the surface; larger "
-               "= coarser. Of a scan so coarse that most of its samples lie in cubes of too few it "
+               "= coarser. Of a scan so coarse or noisy that most of its samples lie in none it "
                "grows, up to four times.")
       .Positive();
   fields
@@ -143,16 +161,16 @@ std::vector<std::string> ScanPatchOptions::Problems() const { return ProblemsOf(
 
 ScanPatches::ScanPatches(const std::vector<Scan>& scans, const ScanPatchOptions& options)
     : cell_size_(options.cell_size) {
-  CellGrid grid = MakeGrid(scans, cell_size_);
-  while (cell_size_ < kMostGrowth * options.cell_size &&
-         grid.ShareOfFullCells(options.min_samples) < kEnoughInPatches) {
-    cell_size_ *= kGrowth;
-    grid = MakeGrid(scans, cell_size_);
+  FlatCubes flattest = FindFlatCubes(scans, cell_size_, options);
+  const double largest = kMostGrowth * options.cell_size;
+  for (double size = kGrowth * cell_size_; flattest.enough < 1 && size <= largest;
+       size *= kGrowth) {
+    FlatCubes larger = FindFlatCubes(scans, size, options);
+    if (larger.enough <= flattest.enough) continue;
+    flattest = std::move(larger);
+    cell_size_ = size;
   }
-  for (const Cell& cell : grid.cells()) {
-    const auto patch = FitPatch(cell, cell_size_, options);
-    if (patch) patches_.push_back(*patch);
-  }
+  patches_ = std::move(flattest.patches);
   if (!patches_.empty()) BuildTree(0, static_cast<int>(patches_.size()));
 }
 

@@ -30,8 +30,8 @@ void VisitSurface(const Scan& scan, double spacing,
                   const std::function<void(const Eigen::Vector3d& x_in_scan)>& visit);
 
 struct ScanPatchOptions {
-  // Metres; edge of the cubes whose samples make one patch. Larger for scans that are so coarse
-  // that most samples would lie in cubes of too few.
+  // Metres; edge of the cubes whose samples make one patch. Larger for scans that are so coarse or
+  // noisy that most samples would lie in none.
   double cell_size = 0.06;
   int min_samples = 6;  // a cube with fewer samples makes no patch
   // A cube makes a patch only if its samples are flat: thickness below this share of their second

@@ -39,6 +39,31 @@ TEST(SimilarityFit, FindsTheSurfaceFromSeveralCentimetresAway) {
   }
 }
 
+// A depth camera's noise grows with the square of the range: across the room no cube of 6 cm is flat.
+TEST(SimilarityFit, FindsTheSurfaceOfANoisyScan) {
+  SimulatedRoomOptions options = CaseOptions(1);
+  options.depth_camera = true;
+  options.depth_drift = 0;
+  options.range_noise = 0.004;
+  const SimulatedRoom room(options);
+  const SparseModel model = room.MakeSparseModel(2000, 0.7);
+  const std::vector<Scan> scans = {room.MakeScan(0)};
+  const ScanPatches surface(scans, ScanPatchOptions());
+  EXPECT_GT(surface.cell_size(), ScanPatchOptions().cell_size);
+  const auto measured = static_cast<double>(
+      std::count_if(scans[0].points.begin(), scans[0].points.end(),
+                    [](const Eigen::Vector3d& x) { return x.allFinite(); }));
+  double in_patches = 0;
+  for (const ScanPatch& patch : surface.patches()) in_patches += patch.num_samples;
+  EXPECT_GT(in_patches, 0.4 * measured);
+  const SimilarityFit fit =
+      FitToSurface(model, FindSurfacePoints(model, 3, 0.7), surface, {}, {}, 1.5, 0.2,
+                   Disturbed(room.ScanFromSparse(), 0.5, 0.03, 0.005), SimilarityFitOptions());
+  ASSERT_TRUE(fit.converged);
+  EXPECT_GT(fit.num_points, 400);
+  EXPECT_LT(WorstPoseErrors(room, model, fit.scan_from_sparse).position, 0.03);
+}
+
 // Samples 5 cm apart on the walls.
 TEST(SimilarityFit, FindsTheSurfaceOfACoarseScan) {
   SimulatedRoomOptions options = CaseOptions(1);
