@@ -359,7 +359,7 @@ void ChangeExif(const std::string& path, const Change& change) {
     image->writeMetadata();
   } catch (const std::exception& error) {
     throw InputError(path, "", std::string("EXIF cannot be written (") + error.what() + ")",
-                     "Check that the file is a JPEG that may be written");
+                     "Check that the file is a picture that may be written");
   }
 }
 
@@ -379,6 +379,21 @@ void WriteExposureData(const std::string& path, const ExposureData& exposure) {
     if (!exposure.camera.empty()) set("Exif.Image.Model", exposure.camera);
     if (!exposure.date_time.empty()) set("Exif.Photo.DateTimeOriginal", exposure.date_time);
   });
+}
+
+void CopyExif(const std::vector<char>& picture, const std::string& path) {
+  SilenceExiv2();
+  Exiv2::ExifData given;
+  try {
+    const auto image = Exiv2::ImageFactory::open(
+        reinterpret_cast<const Exiv2::byte*>(picture.data()), static_cast<long>(picture.size()));
+    image->readMetadata();
+    given = image->exifData();
+  } catch (const std::exception&) {
+    return;
+  }
+  if (given.empty()) return;
+  ChangeExif(path, [&given](Exiv2::ExifData* exif) { *exif = given; });
 }
 
 void WriteFocalLength(const std::string& path, double focal_length, std::array<int, 2> size) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <opencv2/core/mat.hpp>
 
@@ -51,6 +52,10 @@ std::array<int, 2> ReadPhotoSize(const std::string& path);
 ExposureData ReadExposureData(const std::string& path);
 // Writes the fields that are set into an existing JPEG.
 void WriteExposureData(const std::string& path, const ExposureData& exposure);
+
+// The EXIF of a picture, given as the bytes of its file, into another file; nothing where it has
+// none that can be read. Throws InputError if the file cannot be written.
+void CopyExif(const std::vector<char>& picture, const std::string& path);
 
 // Focal length in pixels of the photo as stored, by EXIF: the equivalent on 35 mm film, which CIPA
 // DCG-001 takes by the diagonal, else the focal length with the resolution of the focal plane. Both

@@ -125,13 +125,17 @@ void CopyPicture(const E57Pages& pages, const E57Image& image, const std::string
   output.Commit();
 }
 
-// Empty if that is no picture.
-cv::Mat DecodeBlob(const E57Pages& pages, int64_t section, int64_t num_bytes,
-                   const std::string& what, int flags) {
+std::vector<char> BytesOfBlob(const E57Pages& pages, int64_t section, int64_t num_bytes,
+                              const std::string& what) {
   std::vector<char> bytes;
   ReadBlob(pages, section, num_bytes, what, [&bytes](const char* more, std::streamsize count) {
     bytes.insert(bytes.end(), more, more + count);
   });
+  return bytes;
+}
+
+// Empty if that is no picture.
+cv::Mat Decoded(const std::vector<char>& bytes, int flags) {
   try {
     return cv::imdecode(bytes, flags | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception&) {
@@ -139,15 +143,14 @@ cv::Mat DecodeBlob(const E57Pages& pages, int64_t section, int64_t num_bytes,
   }
 }
 
-// 8-bit BGR and alpha, which is 0 where the mask says that the picture shows nothing; empty where
-// no mask says so. fits: false if picture or mask cannot be decoded, or differ in size.
-cv::Mat MaskedPicture(const E57Pages& pages, const E57Image& image, bool* fits) {
-  *fits = true;
-  if (image.num_mask_bytes == 0) return {};
-  cv::Mat picture =
-      DecodeBlob(pages, image.section, image.num_bytes, "a picture", cv::IMREAD_COLOR);
-  const cv::Mat mask =
-      DecodeBlob(pages, image.mask_section, image.num_mask_bytes, "a mask", cv::IMREAD_GRAYSCALE);
+// bytes: of the picture's file. 8-bit BGR and alpha, which is 0 where the mask says that the
+// picture shows nothing; empty where no mask says so. fits: false if picture or mask cannot be
+// decoded, or differ in size.
+cv::Mat MaskedPicture(const std::vector<char>& bytes, const E57Pages& pages, const E57Image& image,
+                      bool* fits) {
+  const cv::Mat picture = Decoded(bytes, cv::IMREAD_COLOR);
+  const cv::Mat mask = Decoded(
+      BytesOfBlob(pages, image.mask_section, image.num_mask_bytes, "a mask"), cv::IMREAD_GRAYSCALE);
   *fits = !picture.empty() && mask.size() == picture.size();
   if (!*fits || cv::countNonZero(mask == 0) == 0) return {};
   cv::Mat with_alpha;
@@ -199,7 +202,12 @@ class ImageExtractor {
       return;
     }
     bool mask_fits = true;
-    const cv::Mat masked = MaskedPicture(pages_, image, &mask_fits);
+    std::vector<char> bytes;
+    cv::Mat masked;
+    if (image.num_mask_bytes > 0) {
+      bytes = BytesOfBlob(pages_, image.section, image.num_bytes, "a picture");
+      masked = MaskedPicture(bytes, pages_, image, &mask_fits);
+    }
     const std::string file =
         TakeName(FileStem(image.name), image.is_png || !masked.empty() ? ".png" : ".jpg", &taken_);
     const std::string path = (fs::path(folder_) / file).string();
@@ -207,6 +215,7 @@ class ImageExtractor {
       CopyPicture(pages_, image, path);
     } else {
       WritePicture(masked, path);
+      CopyExif(bytes, path);
     }
     if (!mask_fits) {
       result_.notes.push_back(file + " has a mask that does not fit it, which is left out");

@@ -34,6 +34,14 @@ std::optional<double> MetersPerUnit(const std::string& name) {
   return found->second;
 }
 
+std::string LengthUnitOf(const std::string& name) {
+  const std::optional<double> meters = MetersPerUnit(name);
+  for (const std::string& unit : LengthUnitNames()) {
+    if (meters && MetersPerUnit(unit) == meters) return unit;
+  }
+  return "";
+}
+
 const std::vector<std::string>& LengthUnitNames() {
   static const std::vector<std::string> kNames = {"meters", "millimeters",    "centimeters",
                                                   "feet",   "us_survey_feet", "inches"};

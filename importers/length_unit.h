@@ -12,6 +12,9 @@ namespace roomtex {
 // coordinates of a state. None for a name that is not known.
 std::optional<double> MetersPerUnit(const std::string& name);
 
+// The value of --units for a name that MetersPerUnit knows; "" for others.
+std::string LengthUnitOf(const std::string& name);
+
 // The values of --units.
 const std::vector<std::string>& LengthUnitNames();
 

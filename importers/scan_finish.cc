@@ -75,9 +75,8 @@ void FindUpAxisAgain(Scan* scan, std::vector<std::string>* notes) {
 // Formats that do not say their unit, and scans that are hardly in metres. Whether it noted any.
 bool NoteDoubtfulUnit(const ScanReaderOptions& options, const Scan& scan, ScanFile* file) {
   const bool is_silent = file->format == "PLY" || file->format == "OBJ" || file->format == "PCD" ||
-                         file->format == "PTX" || file->format == "XYZ" ||
-                         (file->format == "LAS" && !file->unit_is_said);
-  if (!is_silent || !options.units.empty()) return false;
+                         file->format == "PTX" || file->format == "XYZ" || file->format == "LAS";
+  if (!is_silent || file->unit_is_said || !options.units.empty()) return false;
   const std::string unit = LikelierUnit(scan);
   if (unit.empty()) return false;
   const Bounds bounds = FindBounds(scan);

@@ -164,14 +164,23 @@ class ScanFinish {
   const ScanVisitor& visit_;
 };
 
-// As the file says it, with a note, unless the option does.
+// said: what the file says, one of LengthUnitNames() or ""; it counts, with a note, unless the
+// option says another.
+void TakeUnit(const std::string& said, const ScanReaderOptions& options, ScanFile* file) {
+  file->unit_is_said = file->unit_is_said || !said.empty();
+  if (said.empty() || said == "meters" || !options.units.empty()) return;
+  file->notes.push_back("the file says that its unit is " + said +
+                        "; coordinates become metres (--units says another)");
+  file->meters_per_unit = *MetersPerUnit(said);
+}
+
 void TakeUnitOfLas(const std::string& path, const ScanReaderOptions& options, ScanFile* file) {
   if (!options.units.empty()) {
     file->meters_per_unit = *MetersPerUnit(options.units);
     return;
   }
   const LasUnits units = ReadLasUnits(path);
-  file->unit_is_said = units.projected || !units.horizontal.empty();
+  file->unit_is_said = units.projected;
   if (units.degrees) {
     throw InputError(path, "", "has coordinates of longitude and latitude",
                      "Project it (UTM, for example), by pdal translate with filters.reprojection; "
@@ -188,13 +197,10 @@ void TakeUnitOfLas(const std::string& path, const ScanReaderOptions& options, Sc
         (units.vertical.empty() ? std::string() : " (of its heights: " + units.vertical + ")") +
         ": its coordinates are taken for metres (--units says another)");
   }
+  TakeUnit(units.horizontal, options, file);
   if (units.horizontal.empty() || units.horizontal == "meters") {
     file->coordinate_system = units.wkt;
-    return;
   }
-  file->notes.push_back("the file says that its unit is " + units.horizontal +
-                        "; coordinates become metres (--units says another)");
-  file->meters_per_unit = *MetersPerUnit(units.horizontal);
 }
 
 ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options,
@@ -272,7 +278,8 @@ ScanFile ReadWith(const std::string& given_path, const ScanReaderOptions& option
   } else if (ForeignFormat(start).empty() && LooksLikeXyz(start)) {
     file.format = "XYZ";
     file.byte_order = "text";
-    file.scans.push_back(ReadXyz(path, {meters_per_unit, options.max_range, options.colors}));
+    TakeUnit(UnitOfXyz(start), options, &file);
+    file.scans.push_back(ReadXyz(path, {file.meters_per_unit, options.max_range, options.colors}));
   } else {
     const std::string foreign = ForeignFormat(start);
     throw InputError(path, BytePosition(0),

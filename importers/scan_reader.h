@@ -52,7 +52,7 @@ struct ScanFile {
   // sentence or "". Other formats: "".
   std::string azimuth, azimuth_note;
   double meters_per_unit = 1;
-  bool unit_is_said = false;  // LAS: by its coordinate system
+  bool unit_is_said = false;  // LAS: by its coordinate system; XYZ: by the names of its columns
   // LAS: OGC WKT of the system that the coordinates are in as they were read; "" = not known, or
   // they became metres.
   std::string coordinate_system;

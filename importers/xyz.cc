@@ -178,6 +178,11 @@ Scan ReadXyz(const std::string& path, const XyzOptions& options) {
   return XyzParser(file, options).Parse();
 }
 
+std::string UnitOfXyz(std::string_view start) {
+  const XyzLayout layout = FindXyzLayout(start);
+  return layout.columns ? layout.columns->unit : "";
+}
+
 bool LooksLikeXyz(std::string_view start) { return FindXyzLayout(start).columns.has_value(); }
 
 std::optional<XyzKind> XyzKindOf(const std::string& extension) {

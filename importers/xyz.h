@@ -24,6 +24,10 @@ struct XyzOptions {
 // intensity, the grey of the colours is. Throws InputError with the line.
 Scan ReadXyz(const std::string& path, const XyzOptions& options);
 
+// The unit of its coordinates by the names of its columns ("x [mm]"), one of LengthUnitNames(); ""
+// = not said. start: of the file.
+std::string UnitOfXyz(std::string_view start);
+
 // The start of a file is that of such a text.
 bool LooksLikeXyz(std::string_view start);
 

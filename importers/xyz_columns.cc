@@ -7,6 +7,7 @@
 
 #include "core/text.h"
 #include "importers/file_reader.h"
+#include "importers/length_unit.h"
 
 namespace roomtex {
 namespace {
@@ -162,7 +163,7 @@ XyzColumns XyzColumns::ByNumber(size_t count, const Rows& rows) {
 }
 
 std::optional<XyzColumns> XyzColumns::ByName(const std::vector<std::string_view>& words) {
-  std::vector<std::string> names;
+  std::vector<std::string> names, units;
   for (const std::string_view word : words) {
     std::string name(word);
     for (const char mark : {'"', '\'', '/', '#'}) {
@@ -170,11 +171,18 @@ std::optional<XyzColumns> XyzColumns::ByName(const std::vector<std::string_view>
     }
     name = LowerCase(name);
     // A unit, stuck to the name or a word by itself.
-    for (const std::string_view unit : {"[m]", "(m)"}) {
-      const size_t at = name.size() - std::min(unit.size(), name.size());
-      if (name.compare(at, std::string::npos, unit) == 0) name.erase(at);
+    std::string unit;
+    const size_t at = name.find_first_of("[(");
+    if (at != std::string::npos && (name.back() == ']' || name.back() == ')')) {
+      unit = name.substr(at + 1, name.size() - at - 2);
+      name.erase(at);
     }
-    if (!name.empty()) names.push_back(name);
+    if (!name.empty()) {
+      names.push_back(name);
+      units.push_back(unit);
+    } else if (!units.empty() && !unit.empty()) {
+      units.back() = unit;
+    }
   }
   // The first of `wanted` that is there.
   const auto find = [&names](std::initializer_list<const char*> wanted) {
@@ -193,6 +201,8 @@ std::optional<XyzColumns> XyzColumns::ByName(const std::vector<std::string_view>
   columns.place[1] = find({"y", "northing", "north"});
   columns.place[2] = find({"z", "elevation", "height"});
   if (*std::min_element(columns.place, columns.place + 3) < 0) return std::nullopt;
+  const auto unit_of = [&](int k) { return LengthUnitOf(units[columns.place[k]]); };
+  if (unit_of(0) == unit_of(1) && unit_of(0) == unit_of(2)) columns.unit = unit_of(0);
   columns.intensity = find({"intensity", "i", "scalar_intensity", "reflectance"});
   columns.color[0] = find({"r", "red"});
   columns.color[1] = find({"g", "green"});

@@ -2,6 +2,7 @@
 // What the columns of a text file of points are, as the lines that it begins with show.
 
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct XyzColumns {
   int color[3] = {-1, -1, -1};
   int normal[3] = {-1, -1, -1};
   size_t count = 0;
+  // One of LengthUnitNames(), where x, y and z are named with it alike; "" = not said.
+  std::string unit;
 
   // By their number and, where that leaves it open, by what stands in them: three last columns of
   // unit length are a normal; of "r g b scalar" and "intensity r g b" those are the colours that

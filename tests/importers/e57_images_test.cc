@@ -52,7 +52,14 @@ class E57Images : public testing::Test {
   }
   void Add(const std::string& name, const std::string& kind, int width, int height,
            const std::string& pose, const std::string& more = "", bool png = true) {
-    const std::string picture = Picture(width, height, png ? ".png" : ".jpg");
+    std::string picture = Picture(width, height, png ? ".png" : ".jpg");
+    if (!png) {
+      WriteBytes(folder_ / "picture.jpg", picture);
+      ExposureData exposure;
+      exposure.exposure_time = 0.02;
+      WriteExposureData(folder_ / "picture.jpg", exposure);
+      picture = ReadBytes(folder_ / "picture.jpg");
+    }
     pictures_.push_back(picture);
     const std::string blob = Blob(png ? "pngImage" : "jpegImage", picture);
     images_ +=
@@ -130,6 +137,7 @@ TEST_F(E57Images, WhereAMaskShowsNothingThePhotoIsTransparent) {
   EXPECT_EQ(picture.at<cv::Vec4b>(7, 29)[3], 0);
   EXPECT_EQ(picture.at<cv::Vec4b>(7, 30)[3], 255);
   EXPECT_NEAR(picture.at<cv::Vec4b>(7, 70)[1], 200, 4);
+  EXPECT_NEAR(ReadExposureData(folder_ / "photos/part.png").exposure_time.value_or(0), 0.02, 1e-6);
   EXPECT_EQ(Model().images.size(), 5u);
   // Nothing is masked, or the mask is none: byte by byte.
   for (const int i : {1, 2}) {

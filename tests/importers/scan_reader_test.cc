@@ -45,6 +45,27 @@ class ScanReader : public testing::Test {
   TempFolder folder_;
 };
 
+TEST_F(ScanReader, ColumnsThatNameTheirUnitAreReadInIt) {
+  const std::string row = "1500 250 -500 0.5\n";
+  for (const char* names : {"x[mm] y[mm] z[mm] i", "X (mm),Y (mm),Z (mm),Intensity [0-1]",
+                            "# x [mm] y [mm] z [mm] intensity", "x(MM);y(mm);z(mm);r[]"}) {
+    const ScanFile file = ReadScanFile(Write("a.xyz", names + ("\n" + row)), {});
+    EXPECT_THAT(file.scans[0].points[0], IsNearMatrix(Eigen::Vector3d(1.5, 0.25, -0.5), 1e-12))
+        << names;
+    EXPECT_THAT(file.notes, Contains(HasSubstr("its unit is millimeters"))) << names;
+  }
+  ScanReaderOptions options;
+  options.units = "centimeters";
+  const std::string path = Write("a.xyz", "x[mm] y[mm] z[mm] i\n" + row);
+  EXPECT_EQ(ReadScanFile(path, options).scans[0].points[0].x(), 15);
+  // Said of all three alike, or of none.
+  for (const char* names :
+       {"x[mm] y[mm] z[m] i", "x[mm] y z i", "x[m] y[m] z[m] i", "x[?] y z i"}) {
+    const ScanFile file = ReadScanFile(Write("b.xyz", names + ("\n" + row)), {});
+    EXPECT_EQ(file.scans[0].points[0].x(), 1500) << names;
+  }
+}
+
 TEST_F(ScanReader, ColoursStandInForIntensityWhereMostSamplesHaveOne) {
   ScanReaderOptions options;
   options.colors_as_intensity = true;

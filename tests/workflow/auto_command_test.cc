@@ -227,7 +227,6 @@ TEST_F(AutoCommand, SaysWhatAPersonCanDoWhereAStepIsNotToBeTrusted) {
   EXPECT_THAT(result.err, HasSubstr("start again"));
   // Nothing but a word of the user would be missing, if it were the right room.
   EXPECT_EQ(ReadJson(Result("log/align.json"))["search"]["hint_decides"], true);
-  EXPECT_THAT(result.err, HasSubstr("If photos and scan are of one room, pick one point"));
   EXPECT_THAT(result.err, HasSubstr("--near PHOTO,X,Y,Z"));
   EXPECT_FALSE(fs::exists(Result("textured")));
   const json report = ReadJson(Result("report.json"));
@@ -237,7 +236,12 @@ TEST_F(AutoCommand, SaysWhatAPersonCanDoWhereAStepIsNotToBeTrusted) {
   EXPECT_THAT(page, HasSubstr("What to do now"));
   // What was found, and what else there is.
   const json& search = report["searches"][0];
-  EXPECT_EQ(search["verdict"], "unconfirmed");
+  // COLMAP's threads decide which: of seven models two fitted a second place 20 cm beside as well.
+  const bool unconfirmed = search["verdict"] == "unconfirmed";
+  EXPECT_TRUE(unconfirmed || search["verdict"] == "ambiguous") << search["verdict"];
+  EXPECT_THAT(result.err,
+              HasSubstr(unconfirmed ? "If photos and scan are of one room, pick one point"
+                                    : "Pick one point that photo and scan both show, where"));
   EXPECT_EQ(search["chance_counted"], false);
   EXPECT_EQ(search["places"][0]["place"], "best");
   EXPECT_EQ(search["places"][1]["place"], "second");
@@ -491,7 +495,7 @@ TEST_F(AutoCommand, FeaturesOutliveTheirMatches) {
   }
   const std::string database_path = few + "/result/database.db";
   const std::string arguments = "roomtex-auto --quality low --image_path " + few +
-                                "/photos --scan_path " + (*folder_ / "capture/scan.rtpi") +
+                                "/photos --scan_path " + (*folder_ / "other/scan.rtpi") +
                                 " --cameras_path " + (*folder_ / "capture/cameras.txt") +
                                 " --output_path " + few + "/result";
   const CommandResult first = RunCommandLine(arguments + " --until matches");
