@@ -39,7 +39,8 @@ TEST(SimilarityFit, FindsTheSurfaceFromSeveralCentimetresAway) {
   }
 }
 
-// A depth camera's noise grows with the square of the range: across the room no cube of 6 cm is flat.
+// A depth camera's noise grows with the square of the range: across the room no cube of 6 cm is
+// flat.
 TEST(SimilarityFit, FindsTheSurfaceOfANoisyScan) {
   SimulatedRoomOptions options = CaseOptions(1);
   options.depth_camera = true;
@@ -50,9 +51,9 @@ TEST(SimilarityFit, FindsTheSurfaceOfANoisyScan) {
   const std::vector<Scan> scans = {room.MakeScan(0)};
   const ScanPatches surface(scans, ScanPatchOptions());
   EXPECT_GT(surface.cell_size(), ScanPatchOptions().cell_size);
-  const auto measured = static_cast<double>(
-      std::count_if(scans[0].points.begin(), scans[0].points.end(),
-                    [](const Eigen::Vector3d& x) { return x.allFinite(); }));
+  const auto measured =
+      static_cast<double>(std::count_if(scans[0].points.begin(), scans[0].points.end(),
+                                        [](const Eigen::Vector3d& x) { return x.allFinite(); }));
   double in_patches = 0;
   for (const ScanPatch& patch : surface.patches()) in_patches += patch.num_samples;
   EXPECT_GT(in_patches, 0.4 * measured);
