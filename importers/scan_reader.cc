@@ -174,11 +174,9 @@ void TakeUnit(const std::string& said, const ScanReaderOptions& options, ScanFil
   file->meters_per_unit = *MetersPerUnit(said);
 }
 
+// Likewise, of its coordinate system, with what else that says.
 void TakeUnitOfLas(const std::string& path, const ScanReaderOptions& options, ScanFile* file) {
-  if (!options.units.empty()) {
-    file->meters_per_unit = *MetersPerUnit(options.units);
-    return;
-  }
+  if (!options.units.empty()) return;
   const LasUnits units = ReadLasUnits(path);
   file->unit_is_said = units.projected;
   if (units.degrees) {

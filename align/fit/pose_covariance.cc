@@ -324,6 +324,7 @@ BundleCovariances FindCovariances(const PlaneBundleInput& input, const PlaneBund
     BundleCovariances of_group = ReducedSystem(input, bundle, options, max_poses, photos).Find();
     found.poses.merge(of_group.poses);
     for (const auto& [camera_id, covariance] : of_group.cameras) {
+      // Every group says at least what is open: the smallest comes nearest.
       const auto [at, is_first] = found.cameras.emplace(camera_id, covariance);
       if (!is_first && covariance.trace() < at->second.trace()) at->second = covariance;
     }

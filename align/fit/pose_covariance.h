@@ -24,8 +24,9 @@ inline constexpr size_t kMaxPosesTogether = 400;
 // the same for all points within half a metre of it, so that thousands of points on a wall do not
 // make it exact. More than max_poses photos are taken in groups of their order, each as if there
 // were no others: that says more than all photos leave open, never less. Empty for a bundle that is
-// not usable, and where something stays open. What the rows' motions leave open is in them; for
-// more than half of max_poses photos by what each photo's own adds where all others are known.
+// not usable, without the group where something stays open. What the rows' motions leave open is in
+// them; for more than half of max_poses photos by what each photo's own adds where all others are
+// known.
 struct BundleCovariances {
   PoseCovariances poses;
   std::map<uint32_t, Eigen::MatrixXd> cameras;

@@ -39,6 +39,12 @@ TEST(SimilarityFit, FindsTheSurfaceFromSeveralCentimetresAway) {
   }
 }
 
+SimilarityFit FitDisturbed(const SimulatedRoom& room, const SparseModel& model,
+                           const ScanPatches& surface) {
+  return FitToSurface(model, FindSurfacePoints(model, 3, 0.7), surface, {}, {}, 1.5, 0.2,
+                      Disturbed(room.ScanFromSparse(), 0.5, 0.03, 0.005), SimilarityFitOptions());
+}
+
 // A depth camera's noise grows with the square of the range: across the room no cube of 6 cm is
 // flat.
 TEST(SimilarityFit, FindsTheSurfaceOfANoisyScan) {
@@ -57,9 +63,7 @@ TEST(SimilarityFit, FindsTheSurfaceOfANoisyScan) {
   double in_patches = 0;
   for (const ScanPatch& patch : surface.patches()) in_patches += patch.num_samples;
   EXPECT_GT(in_patches, 0.4 * measured);
-  const SimilarityFit fit =
-      FitToSurface(model, FindSurfacePoints(model, 3, 0.7), surface, {}, {}, 1.5, 0.2,
-                   Disturbed(room.ScanFromSparse(), 0.5, 0.03, 0.005), SimilarityFitOptions());
+  const SimilarityFit fit = FitDisturbed(room, model, surface);
   ASSERT_TRUE(fit.converged);
   EXPECT_GT(fit.num_points, 400);
   EXPECT_LT(WorstPoseErrors(room, model, fit.scan_from_sparse).position, 0.03);
@@ -76,9 +80,7 @@ TEST(SimilarityFit, FindsTheSurfaceOfACoarseScan) {
   EXPECT_GT(surface.cell_size(), ScanPatchOptions().cell_size);
   EXPECT_EQ(ScanPatches(MakeCase().scans, ScanPatchOptions()).cell_size(),
             ScanPatchOptions().cell_size);
-  const SimilarityFit fit =
-      FitToSurface(model, FindSurfacePoints(model, 3, 0.7), surface, {}, {}, 1.5, 0.2,
-                   Disturbed(room.ScanFromSparse(), 0.5, 0.03, 0.005), SimilarityFitOptions());
+  const SimilarityFit fit = FitDisturbed(room, model, surface);
   ASSERT_TRUE(fit.converged);
   EXPECT_GT(fit.num_points, 800);
   EXPECT_LT(WorstPoseErrors(room, model, fit.scan_from_sparse).position, 0.0015);
