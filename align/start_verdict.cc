@@ -223,8 +223,10 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   const bool confirmed = verdict.support == PhotoSupport::kClear || verdict.looks_alike;
   const bool alone = !confirmed && verdict.support == PhotoSupport::kNone;
   verdict.ratio = score / std::max({second, verdict.mirrored_score, 1e-6});
-  const double min_score = alone ? options.min_score_alone : options.min_score;
-  verdict.chance_wrong = ChanceWrong(verdict, score, options.min_score);
+  const double min_score = verdict.support == PhotoSupport::kClear ? options.min_score_confirmed
+                           : alone                                 ? options.min_score_alone
+                                                                   : options.min_score;
+  verdict.chance_wrong = ChanceWrong(verdict, score, min_score);
   const ScanPatches& surface = input.surveyed.patches();
   if (alone && verdict.mirrored_score >= min_score &&
       verdict.mirrored_score >= options.min_ratio_mirrored * score &&

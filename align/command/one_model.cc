@@ -265,23 +265,19 @@ DuplicatesAside SetDuplicatesAside(const MapperVerdict& verdict, const std::vect
   return aside;
 }
 
-// Doubts end of photos that lack what others found, but show what others show: photos taken from
-// far apart are not matched.
-void BelieveWhatShowsTheSame(const AlignedPhotos& aligned, const SurveyedScans& surveyed,
-                             int num_threads, std::map<uint32_t, PhotoVerdict>* photos) {
+// Where photos can be compared with each other on the surface.
+void CompareDoubtfulPhotos(const AlignedPhotos& aligned, const SurveyedScans& surveyed,
+                           int num_threads, std::map<uint32_t, PhotoVerdict>* photos) {
   std::set<uint32_t> asked, doubtful;
   for (const auto& [id, photo] : *photos) {
     if (photo.doubt.empty()) continue;
     doubtful.insert(id);
-    if (photo.lacks_sights) asked.insert(id);
+    if (photo.lacks_sights || photo.other_room >= 0) asked.insert(id);
   }
   if (asked.empty() || aligned.image_path.empty()) return;
-  for (const auto& [id, detail] : CompareDetail(aligned, surveyed.viewer(), asked, doubtful,
-                                                PhotoDetailOptions(), num_threads)) {
-    PhotoVerdict& photo = photos->at(id);
-    photo.detail = detail;
-    if (detail.Agrees()) photo.doubt.clear();
-  }
+  BelieveWhatShowsTheSame(
+      CompareDetail(aligned, surveyed.viewer(), asked, doubtful, PhotoDetailOptions(), num_threads),
+      photos);
 }
 
 // Photos that agree with nobody are named; too many of them, and the model is not to be trusted.
@@ -311,12 +307,13 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(
   for (const uint32_t id : ran_away) {
     PhotoVerdict& photo = photos.at(id);
     photo.lacks_sights = false;  // whatever it shows, its pose is not to be believed
+    photo.other_room = -1;
     if (!photo.doubt.empty()) continue;
     photo.doubt =
         "its points want it elsewhere than the sparse model has it, so that it was not adjusted to "
         "the scan, and how far it is off is not known";
   }
-  BelieveWhatShowsTheSame(photographed, surveyed, context.options.num_threads, &photos);
+  CompareDoubtfulPhotos(photographed, surveyed, context.options.num_threads, &photos);
   size_t num_doubtful = 0;
   for (const auto& [id, photo] : photos) {
     if (photo.doubt.empty()) continue;

@@ -19,6 +19,10 @@ constexpr double kParallel = 0.9;
 constexpr double kLeavesPlane = 2.5;
 // A patch thicker than this many times the typical one is not flat.
 constexpr double kMaxThickness = 3.0;
+// Metres; what may be unknown, along the surface's normal, of a point that two photos alone show.
+// No third says that their match is right, and where their rays hardly cross (a camera that turns
+// on the spot, the desk) it may lie on any surface near by.
+constexpr double kMaxSigmaOfTwo = 0.01;
 
 // How far the surface itself leaves the plane, metres (root mean square): the distances of the
 // patches on it, in which the noise of the samples is averaged out.
@@ -105,7 +109,11 @@ class Association {
                                  double gate) const {
     const Eigen::Vector3d& n = constraint.normal;
     if (!(n.dot(point.to_cameras) > kMinFacing * point.to_cameras.norm())) return std::nullopt;
-    const double variance = n.dot(point.covariance * n) + constraint.sigma * constraint.sigma;
+    const double own_variance = n.dot(point.covariance * n);
+    if (point.num_observations < 3 && !(own_variance <= kMaxSigmaOfTwo * kMaxSigmaOfTwo)) {
+      return std::nullopt;
+    }
+    const double variance = own_variance + constraint.sigma * constraint.sigma;
     const double distance = std::abs(constraint.Distance(point.x_in_sparse));
     constraint.point3d_id = point.point3d_id;
     const Candidate candidate{constraint, distance, distance / std::sqrt(variance)};

@@ -45,6 +45,7 @@ struct PlaneAssociationOptions {
 //    deviations say (a first guess of the alignment, a bent scan), the gate widens with them;
 //  - the plane has samples there (ScanPlane::Covers);
 //  - the surface faces the cameras that see the point;
+//  - a point that two photos alone show is known to a centimetre along the normal;
 //  - only one plane claims it: at the edge where two meet the point is left out.
 // `planes` come first. With `surface`, a flat patch near the point holds it where no plane does,
 // and where the patch shows that the scan leaves the plane there: a bent wall, a picture on it.

@@ -29,7 +29,7 @@ struct PlaneBundleOptions {
   // Which points are held on which surface: by flat patches, too (thesis, chapter 10). Each round
   // has a gate of its own.
   PlaneAssociationOptions association;
-  int min_track = 3;  // observations that a point needs to be held on a surface
+  int min_track = 2;  // observations that a point needs to be held on a surface
   // The photo of the picks keeps its pose, as in the thesis; else its picks hold it no more than
   // their noise allows.
   bool fix_clicked_view = false;

@@ -149,6 +149,7 @@ std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_tr
     SurfacePoint point;
     point.x_in_sparse = sparse.x_in_model;
     point.point3d_id = id;
+    point.num_observations = static_cast<int>(sparse.track.size());
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
     double mean_distance = 0;
     for (const TrackElement& element : sparse.track) {

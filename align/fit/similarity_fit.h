@@ -40,6 +40,7 @@ struct SurfacePoint {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // sparse units^2
   Eigen::Vector3d to_cameras = Eigen::Vector3d::Zero();  // mean direction to its cameras, `sparse`
   uint64_t point3d_id = kInvalidPoint3dId;
+  int num_observations = 0;
 };
 
 // min_track; 2 in a model that has fewer than kFewPoints points of so many observations, as one of

@@ -41,9 +41,10 @@ constexpr size_t kMinExpected = 60;
 // right photo that looks past what was scanned (desk) has 0.07.
 constexpr double kMinJudgedOfPhoto = 10;
 
-// Of rooms that are alike, those of all but the one that photos are known to be of, or the largest.
-std::set<uint32_t> InOtherRooms(const SparseModel& aligned, const ExpectedSightings& expected,
-                                const std::set<uint32_t>& known) {
+// Of rooms that are alike, those of all but the one that photos are known to be of, or the largest:
+// the room of each photo of the others.
+std::map<uint32_t, int> InOtherRooms(const SparseModel& aligned, const ExpectedSightings& expected,
+                                     const std::set<uint32_t>& known) {
   std::vector<std::set<uint32_t>> rooms = FindLookalikeRooms(aligned, expected).rooms;
   const auto num_known = [&](const std::set<uint32_t>& room) {
     return std::count_if(room.begin(), room.end(),
@@ -52,9 +53,10 @@ std::set<uint32_t> InOtherRooms(const SparseModel& aligned, const ExpectedSighti
   const auto own = std::max_element(rooms.begin(), rooms.end(), [&](const auto& a, const auto& b) {
     return num_known(a) < num_known(b);
   });
-  std::set<uint32_t> elsewhere;
+  std::map<uint32_t, int> elsewhere;
   for (auto room = rooms.begin(); room != rooms.end(); ++room) {
-    if (room != own) elsewhere.insert(room->begin(), room->end());
+    if (room == own) continue;
+    for (const uint32_t id : *room) elsewhere[id] = static_cast<int>(room - rooms.begin());
   }
   return elsewhere;
 }
@@ -63,7 +65,7 @@ std::set<uint32_t> InOtherRooms(const SparseModel& aligned, const ExpectedSighti
 // that came together find each other's points, and lack those of all others, as these lack theirs:
 // the shares of both suffer, and do not tell which is which. With those that are `elsewhere`.
 std::set<uint32_t> OutsideLargestGroup(const ExpectedSightings& expected,
-                                       const std::set<uint32_t>& elsewhere) {
+                                       const std::map<uint32_t, int>& elsewhere) {
   std::map<uint32_t, int> index;
   for (const auto& [id, points] : expected) index.emplace(id, static_cast<int>(index.size()));
   CommonOfPairs pairs = CountCommonSightings(expected);
@@ -76,7 +78,11 @@ std::set<uint32_t> OutsideLargestGroup(const ExpectedSightings& expected,
   for (const auto& [pair, common] : pairs) {
     if (common.num_expected >= kMinExpectedOfPair) shares.push_back(common.Share());
   }
-  if (shares.empty()) return elsewhere;
+  std::set<uint32_t> outside;
+  if (shares.empty()) {
+    for (const auto& [id, room] : elsewhere) outside.insert(id);
+    return outside;
+  }
   const double least = kLeastSightShare * Median(&shares);
   DisjointSets sets(static_cast<int>(index.size()));
   for (const auto& [pair, common] : pairs) {
@@ -84,7 +90,6 @@ std::set<uint32_t> OutsideLargestGroup(const ExpectedSightings& expected,
     if (may_tell && common.Share() >= least) sets.Join(index.at(pair.first), index.at(pair.second));
   }
   const int largest = sets.Groups()[0][0];
-  std::set<uint32_t> outside;
   for (const auto& [id, i] : index) {
     if (sets.Find(i) != largest) outside.insert(id);
   }
@@ -197,7 +202,7 @@ std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned, const S
   // By what photos found that belong together; what strangers found together the right ones lack.
   ExpectedSightings expected = FindExpectedSightings(aligned, hides, {});
   CountSights(expected, {}, aligned, &photos);
-  const std::set<uint32_t> elsewhere = InOtherRooms(aligned, expected, picked);
+  const std::map<uint32_t, int> elsewhere = InOtherRooms(aligned, expected, picked);
   std::set<uint32_t> outside = OutsideLargestGroup(expected, elsewhere);
   if (!outside.empty()) {
     expected = FindExpectedSightings(aligned, hides, outside);
@@ -212,6 +217,7 @@ std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned, const S
                     " of its verified matches obey the poses of the model (usual here: more than " +
                     Percent(least_support) + "). ";
     } else if (elsewhere.count(id) > 0) {
+      photo.other_room = elsewhere.at(id);
       photo.doubt = fmt::format(
           "{} photos show what they find in each other, and not what the rest shows at the same "
           "places: another room that is alike, or this one when things stood otherwise. ",
@@ -228,6 +234,26 @@ std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned, const S
           "It may show another room, a repeated pattern or things that were moved, or stand wrong.";
   }
   return photos;
+}
+
+void BelieveWhatShowsTheSame(const std::map<uint32_t, DetailAgreement>& details,
+                             std::map<uint32_t, PhotoVerdict>* photos) {
+  std::map<int, DetailAgreement> of_rooms;
+  for (const auto& [id, detail] : details) {
+    PhotoVerdict& photo = photos->at(id);
+    photo.detail = detail;
+    if (photo.other_room < 0) {
+      if (detail.Agrees()) photo.doubt.clear();
+      continue;
+    }
+    DetailAgreement& of_room = of_rooms[photo.other_room];
+    of_room.num_windows += detail.num_windows;
+    of_room.num_alike += detail.num_alike;
+  }
+  for (auto& [id, photo] : *photos) {
+    const auto of_room = of_rooms.find(photo.other_room);
+    if (of_room != of_rooms.end() && of_room->second.Agrees()) photo.doubt.clear();
+  }
 }
 
 }  // namespace roomtex

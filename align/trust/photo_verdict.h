@@ -35,9 +35,11 @@ struct PhotoVerdict {
   // Share of its verified matches that obey the model's poses; unknown without a database.
   double match_support = kUnknownShare;
   std::string duplicate_of;  // a photo that shows the same from the same place; "" = none
-  // It lacks what others found. That is all that the doubt rests on: what it shows in detail may
-  // overrule it.
+  // What the doubt rests on where what photos show in detail may overrule it: it lacks what others
+  // found, or is one of a group that finds what each other found and not what the rest did (groups
+  // count from 0; -1: of none).
   bool lacks_sights = false;
+  int other_room = -1;
   DetailAgreement detail;  // no windows = not asked
   // Why it is not to be believed, a sentence without the photo's name in front; "" = nothing speaks
   // against it.
@@ -53,5 +55,11 @@ std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned, const S
                                              double sigma_px,
                                              const std::map<uint32_t, double>& match_support,
                                              const std::set<uint32_t>& picked);
+
+// Ends doubts of photos that show what the others show, though they lack what these found: photos
+// taken from far apart are not matched. Of a group that might be of another room all are believed
+// or none, by what they show together: where a single right photo is blurred, the others tell.
+void BelieveWhatShowsTheSame(const std::map<uint32_t, DetailAgreement>& details,
+                             std::map<uint32_t, PhotoVerdict>* photos);
 
 }  // namespace roomtex

@@ -78,6 +78,25 @@ TEST(StartVerdict, WherePhotosAndScanLookAlikeNoRivalCounts) {
   EXPECT_EQ(Judge({moving}, 100).kind, Kind::kWeak);
 }
 
+// Of a room a third of which was scanned: most rays end where nobody measured.
+TEST(StartVerdict, PhotosThatConfirmItClearlyNeedLittleOfTheRoomScanned) {
+  FittedStart best = Asked(Start(330, kExact), 800, 500, true);
+  best.sights.num_short = 0;
+  best.sights.num_unseen = 670;
+  EXPECT_LT(best.sights.Score(), StartVerdictOptions().min_score);
+  const StartVerdict verdict = Judge({best}, 300);
+  EXPECT_EQ(verdict.kind, Kind::kTrusted);
+  EXPECT_EQ(verdict.chance_wrong, kChanceClear);
+  // Support that a similar room would have, too, or none.
+  best = Asked(best, 800, 200, true);
+  EXPECT_EQ(Judge({best}, 100).kind, Kind::kWeak);
+  best.photos.reset();
+  EXPECT_EQ(Judge({best}, 100).kind, Kind::kWeak);
+  // Rays that end before any surface are no matter of what was scanned.
+  FittedStart off = Asked(Start(250, kExact), 800, 500, true);
+  EXPECT_EQ(Judge({off}, 100).kind, Kind::kWeak);
+}
+
 TEST(StartVerdict, FewCornersConfirmOnlyWhereMostOfThemFit) {
   const FittedStart second = Start(500, kExact);
   EXPECT_EQ(Judge({Asked(Start(970, kExact), 300, 120, true), second}, 600).kind, Kind::kTrusted);

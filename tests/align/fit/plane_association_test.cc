@@ -1,5 +1,8 @@
 #include "align/fit/plane_association.h"
 
+#include <cmath>
+#include <vector>
+
 #include <gmock/gmock.h>
 
 #include "tests/support/matchers.h"
@@ -51,6 +54,7 @@ SurfacePoint PointAt(const Eigen::Vector3d& x, uint64_t id = 7) {
   point.covariance = 1e-6 * Eigen::Matrix3d::Identity();
   point.to_cameras = Eigen::Vector3d(0.2, 0, 0.9);
   point.point3d_id = id;
+  point.num_observations = 3;
   return point;
 }
 
@@ -71,6 +75,26 @@ class PlaneAssociation : public testing::Test {
   std::vector<Scan> scans_;
   PlaneAssociationOptions options_;
 };
+
+// Nobody but the surface says that the two belong together, and a point that is known to 3 cm may
+// lie on any.
+TEST_F(PlaneAssociation, TakesPointsOfTwoPhotosThatAreKnownToACentimetre) {
+  SurfacePoint exact = PointAt({0.1, 0.2, 0.004}, 1), rough = PointAt({0.3, 0.2, 0.004}, 2),
+               rough_of_three = PointAt({0.3, 0.3, 0.004}, 3);
+  exact.covariance = std::pow(0.008, 2) * Eigen::Matrix3d::Identity();
+  rough.covariance = rough_of_three.covariance = std::pow(0.03, 2) * Eigen::Matrix3d::Identity();
+  exact.num_observations = rough.num_observations = 2;
+  rough_of_three.num_observations = 3;
+  // What is unknown along the floor does not matter.
+  SurfacePoint along = PointAt({0.2, 0.2, 0.004}, 4);
+  along.num_observations = 2;
+  along.covariance(0, 0) = std::pow(0.1, 2);
+  std::vector<uint64_t> ids;
+  for (const SurfaceConstraint& c : Associate({exact, rough, rough_of_three, along}, {Floor(0)})) {
+    ids.push_back(c.point3d_id);
+  }
+  EXPECT_THAT(ids, testing::ElementsAre(1, 3, 4));
+}
 
 TEST_F(PlaneAssociation, TakesPointsNearThePlaneWithinTheirUncertainty) {
   // Standard deviation of the distance: hypot(1 mm of the point, 1 mm of the surface).

@@ -92,6 +92,53 @@ TEST(PlaneBundle, ReportsTheSamePointsBeforeAndAfter) {
   }
 }
 
+// Of all points but every `kept`-th each photo shares with but one other.
+SparseModel WithTracksOfTwo(SparseModel model, uint64_t kept) {
+  uint64_t next_id = model.points.rbegin()->first + 1;
+  std::map<uint64_t, SparsePoint> pairs;
+  for (auto& [id, point] : model.points) {
+    std::vector<TrackElement>& track = point.track;
+    while (id % kept != 0 && track.size() >= 4) {
+      SparsePoint pair = point;
+      pair.track.assign(track.end() - 2, track.end());
+      track.erase(track.end() - 2, track.end());
+      for (const TrackElement& e : pair.track) {
+        model.images.at(e.image_id).point3d_ids[e.point2d_index] = next_id;
+      }
+      pairs[next_id++] = pair;
+    }
+    if (id % kept != 0 && track.size() == 3) {
+      model.images.at(track[2].image_id).point3d_ids[track[2].point2d_index] = kInvalidPoint3dId;
+      track.pop_back();
+    }
+  }
+  model.points.merge(pairs);
+  return model;
+}
+
+// Photos that overlap little: no third confirms what two show. The surface does.
+TEST(PlaneBundle, PointsOfTwoPhotosHoldPosesWhereFewAreOfMore) {
+  double of_three = 0, of_two = 0;
+  constexpr int kNumRooms = 2;
+  for (int seed = 0; seed < kNumRooms; ++seed) {
+    const SurfaceRoom& room = StraightRoom(seed).room;
+    SparseModel true_model = room.room.MakeSparseModel(2000, 0.2);
+    TransformModel(room.room.ScanFromSparse(), &true_model);
+    const SparseModel model = OnSurface(room, Reconstructed(WithTracksOfTwo(true_model, 18)));
+    for (const int min_track : {3, 2}) {
+      PlaneBundleOptions options;
+      options.min_track = min_track;
+      const PlaneBundle bundle = AdjustToSurface(room.Input(model), options);
+      ASSERT_TRUE(bundle.usable) << bundle.reason;
+      (min_track == 3 ? of_three : of_two) +=
+          PoseErrorsOf(room.room, bundle.model).position.median / kNumRooms;
+    }
+  }
+  EXPECT_LT(of_two, 0.7 * of_three);
+  RecordProperty("three_mm", std::to_string(1000 * of_three));
+  RecordProperty("two_mm", std::to_string(1000 * of_two));
+}
+
 TEST(PlaneBundle, PatchesHelpWhereThereAreFewPlanes) {
   // Of the planes only the floor is known.
   double without = 0, with = 0;

@@ -154,11 +154,42 @@ TEST(PhotoVerdict, DoubtsARoomThatIsAlike) {
       EXPECT_EQ(photo.doubt.empty(), (strangers.count(id) > 0) == picked)
           << id << ": " << photo.sight_share << " of " << photo.num_expected << " "
           << photo.unevenness;
+      EXPECT_EQ(photo.other_room >= 0, !photo.doubt.empty());
       if (!photo.doubt.empty()) {
         EXPECT_NE(photo.doubt.find("another room that is alike"), std::string::npos) << photo.doubt;
       }
     }
   }
+}
+
+// Two sides of one room of which nothing was matched look like two rooms. Photos of either are
+// believed by what they show together, those of a third room are not.
+TEST(PhotoVerdict, BelievesAGroupByWhatItsPhotosShowTogether) {
+  const auto detail = [](int num_windows, int num_alike) {
+    DetailAgreement one;
+    one.num_windows = num_windows;
+    one.num_alike = num_alike;
+    return one;
+  };
+  std::map<uint32_t, PhotoVerdict> photos;
+  for (const uint32_t id : {1, 2, 3, 4, 5, 6, 7, 8}) photos[id].doubt = id > 1 ? "doubt" : "";
+  for (const uint32_t id : {2, 3, 4}) photos[id].other_room = 1;
+  for (const uint32_t id : {5, 6}) photos[id].other_room = 2;
+  for (const uint32_t id : {7, 8}) photos[id].lacks_sights = true;
+  // Blurred (3), and with no windows at all (4).
+  BelieveWhatShowsTheSame({{2, detail(2000, 1940)},
+                           {3, detail(300, 245)},
+                           {5, detail(2000, 1500)},
+                           {6, detail(400, 395)},
+                           {7, detail(800, 780)},
+                           {8, detail(800, 640)}},
+                          &photos);
+  std::set<uint32_t> doubtful;
+  for (const auto& [id, photo] : photos) {
+    if (!photo.doubt.empty()) doubtful.insert(id);
+  }
+  EXPECT_EQ(doubtful, (std::set<uint32_t>{5, 6, 8}));
+  EXPECT_EQ(photos.at(5).detail.num_alike, 1500);
 }
 
 TEST(PhotoVerdict, DoesNotDoubtABlurredPhotoThatFindsLittleAnywhere) {
