@@ -395,9 +395,8 @@ void PlaneBundleOptions::Declare(OptionFields* fields) {
       .Positive();
   fields
       ->Int("PlaneBA.min_track", &min_track,
-            "Observations that a sparse point needs to be held on a surface; of two, it must be "
-            "known "
-            "to a centimetre. A model with fewer than " +
+            "Observations that a sparse point needs to be held on a surface; one of two must be "
+            "known to a centimetre. A model with fewer than " +
                 std::to_string(kFewPoints) + " such points uses those of two, too.")
       .AtLeast(2);
   fields->Bool("PlaneBA.fix_clicked_view", &fix_clicked_view,
