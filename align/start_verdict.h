@@ -17,8 +17,8 @@ struct StartVerdictOptions {
   // times as much as the next best and as the mirror image. Larger = stricter. Where the photos
   // confirm the start, no other counts; where they support it faintly, as those of a similar room
   // do, too, and where nothing but geometry speaks for it (min_score_alone), a user must have said
-  // that it is this room. Photos that confirm it need less (min_score_confirmed): of a room of
-  // which a third was scanned, two thirds of the rays end where nobody measured.
+  // that it is this room. Photos that confirm it clearly need less (min_score_confirmed): of a room
+  // of which a third was scanned, two thirds of the rays end where nobody measured.
   double min_score = 0.55, min_score_alone = 0.7, min_score_confirmed = 0.3, min_ratio = 1.3;
   // The scan is called a mirror image where that of the model has so many times the score.
   double min_ratio_mirrored = 1.15;

@@ -306,7 +306,8 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(
                             KeypointSigma(aligned), support, picked);
   for (const uint32_t id : ran_away) {
     PhotoVerdict& photo = photos.at(id);
-    photo.lacks_sights = false;  // whatever it shows, its pose is not to be believed
+    // Whatever it shows, its pose is not to be believed.
+    photo.lacks_sights = false;
     photo.other_room = -1;
     if (!photo.doubt.empty()) continue;
     photo.doubt =

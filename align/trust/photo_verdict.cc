@@ -79,10 +79,8 @@ std::set<uint32_t> OutsideLargestGroup(const ExpectedSightings& expected,
     if (common.num_expected >= kMinExpectedOfPair) shares.push_back(common.Share());
   }
   std::set<uint32_t> outside;
-  if (shares.empty()) {
-    for (const auto& [id, room] : elsewhere) outside.insert(id);
-    return outside;
-  }
+  for (const auto& [id, room] : elsewhere) outside.insert(id);
+  if (shares.empty()) return outside;
   const double least = kLeastSightShare * Median(&shares);
   DisjointSets sets(static_cast<int>(index.size()));
   for (const auto& [pair, common] : pairs) {
